@@ -3,7 +3,7 @@
 # files of the package, with their licences. Needs Node; run it after a change of versions only.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/page_libraries"
-static=../../ros2_ws/src/paint_deposition/paint_deposition/report/live/static
+static=../../ros2_ws/src/paint_deposition/paint_deposition/report/static
 
 npm ci --ignore-scripts --no-audit --no-fund
 npx esbuild libraries.js --bundle --minify --format=esm --outfile="$static/libraries.js"

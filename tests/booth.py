@@ -6,16 +6,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+import paint_deposition as pd
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.meshes import read_mesh
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
-from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
 from scenes import stamps_ns
 
 SAMPLES = Path(__file__).resolve().parent.parent / 'ros2_ws/src/paint_deposition/samples'
@@ -24,7 +21,7 @@ LOOKING_ALONG_Y = Rotation.from_matrix([[1, 0, 0], [0, 0, 1], [0, -1, 0]]).as_qu
 STANDOFF_M = 0.25
 # A pattern that fits on the panel whole.
 SMALL_PATTERN = PlanarPattern(K1_cm3_per_s=1.0, r_m=0.05, sigma1_m=0.03, sigma2_m=0.04)
-MODEL = DepositionModel(planar=SMALL_PATTERN)
+MODEL = pd.DepositionModel(planar=SMALL_PATTERN)
 
 
 def _square(half_m: float, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
@@ -38,17 +35,17 @@ def _square(half_m: float, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def panel(half_m: float = 0.5, spacing_m: float = 0.02) -> Surface:
+def panel(half_m: float = 0.5, spacing_m: float = 0.02) -> pd.Surface:
     """A square panel in x and z around the origin, outward to -y."""
-    return Surface.from_triangles(*_square(half_m, spacing_m), 2.0 * spacing_m)
+    return pd.Surface.from_triangles(*_square(half_m, spacing_m), 2.0 * spacing_m)
 
 
 @cache
-def panel_with_screen() -> Surface:
+def panel_with_screen() -> pd.Surface:
     """The panel, and 100 mm before it a square screen of 100 mm around the axis y."""
     vertices, faces = _square(0.5, 0.02)
     screen, screen_faces = _square(0.05, 0.02)
-    return Surface.from_triangles(
+    return pd.Surface.from_triangles(
         np.concatenate([vertices, screen - [0.0, 0.1, 0.0]]),
         np.concatenate([faces, screen_faces + len(vertices)]),
         0.04,
@@ -56,26 +53,22 @@ def panel_with_screen() -> Surface:
 
 
 @cache
-def door() -> Surface:
+def door() -> pd.Surface:
     """The sample door, coarse."""
-    return read_mesh(SAMPLES / 'door.stl', max_edge_length_m=0.05)
+    return pd.read_mesh(SAMPLES / 'door.stl', max_edge_length_m=0.05)
 
 
-def spot(x_m: float = 0.0, z_m: float = 0.0, standoff_m: float = STANDOFF_M) -> Trajectory:
+def spot(x_m: float = 0.0, z_m: float = 0.0, standoff_m: float = STANDOFF_M) -> pd.Trajectory:
     """A gun at rest for a second."""
     times = np.linspace(0.0, 1.0, 11)
     positions = np.tile([x_m, -standoff_m, z_m], (len(times), 1))
-    return Trajectory(stamps_ns(times), positions, np.tile(LOOKING_ALONG_Y, (len(times), 1)))
+    return pd.Trajectory(stamps_ns(times), positions, np.tile(LOOKING_ALONG_Y, (len(times), 1)))
 
 
 def serpentine(
-    heights_m=(0.0,),
-    half_width_m: float = 0.45,
-    opens_at_m: float = 0.25,
-    speed_m_per_s: float = 0.3,
-    period_s: float = 0.02,
-    flow: float = 1.0,
-) -> Trajectory:
+    heights_m=(0.0,), half_width_m: float = 0.45, opens_at_m: float = 0.25,
+    speed_m_per_s: float = 0.3, period_s: float = 0.02, flow: float = 1.0,
+) -> pd.Trajectory:  # fmt: skip
     """Level passes in turn to +x and -x; the gun is open within +- opens_at_m."""
     corners = []
     for number, height in enumerate(heights_m):
@@ -91,24 +84,21 @@ def serpentine(
     changes = np.concatenate([begins + opens, begins + legs[0] - opens])
     flows = np.repeat([flow, 0.0], len(begins))
     order = np.argsort(changes)
-    return Trajectory(
+    return pd.Trajectory(
         stamps_ns(times), positions, np.tile(LOOKING_ALONG_Y, (len(times), 1)),
         trigger_stamps_ns=stamps_ns(changes[order]), trigger_flow=flows[order],
     )  # fmt: skip
 
 
-def path_of(trajectory: Trajectory) -> SprayPath:
+def path_of(trajectory: pd.Trajectory) -> SprayPath:
     """The sub-steps of a whole recording."""
     return spray_path(trajectory)[0]
 
 
 def painted(
-    surface: Surface,
-    motion: Trajectory | SprayPath,
-    *effects: Effect,
-    model: DepositionModel = MODEL,
-    precision='double',
-) -> FilmIntegrator:
+    surface: pd.Surface, motion: pd.Trajectory | SprayPath, *effects: Effect,
+    model: pd.DepositionModel = MODEL, precision='double',
+) -> FilmIntegrator:  # fmt: skip
     """The surface after the motion, with these effects."""
     path = motion if isinstance(motion, SprayPath) else path_of(motion)
     model = model.model_copy(update={'effects': effects})
@@ -135,7 +125,7 @@ def spread_m(film_um: np.ndarray, points: SurfacePoints) -> float:
     return float(np.sqrt(volume_cm3(film_um * away_m2, points) / volume_cm3(film_um, points)))
 
 
-def in_batches(trajectory: Trajectory, poses: int, whole_strokes: bool):
+def in_batches(trajectory: pd.Trajectory, poses: int, whole_strokes: bool):
     """The sub-steps as a live node gets them: a few poses at a time, triggers when due."""
     builder = PathBuilder(whole_strokes=whole_strokes)
     triggers = list(zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True))

@@ -1,12 +1,16 @@
-"""A six-axis arm of our own: its URDF, and its tip by the product of exponentials.
+"""A six-axis arm of our own: `arm.urdf`, and its tip by the product of exponentials.
 
 The arm stands upright: base, shoulder, elbow and a wrist whose three axes meet. The URDF gives
 each joint in the frame of the one before; the poses come from the axes of the whole arm at rest.
 """
 
+from pathlib import Path
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+# With `base_link` on the floor and `tool0` at the bell.
+URDF = Path(__file__).with_name('arm.urdf')
 # Joint: place of its axis at rest [m], direction of the axis.
 AXES = {
     'shoulder_pan': ((0.0, 0.0, 0.40), (0, 0, 1)), 'shoulder_lift': ((0.15, 0.0, 0.40), (0, 1, 0)),
@@ -17,35 +21,6 @@ JOINTS = tuple(AXES)
 # At rest the bell looks along +x: its z, by a quarter turn about y.
 TIP_M = np.array([1.20, 0.0, 1.20])
 TIP = Rotation.from_matrix([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
-
-
-def urdf() -> str:
-    """The arm with `base_link` on the floor and `tool0` at the bell."""
-    lines = ['<?xml version="1.0"?>', '<robot name="arm">', '  <link name="base_link"/>']
-    parent, at_m = 'base_link', np.zeros(3)
-    for name, (place_m, axis) in AXES.items():
-        xyz = ' '.join(f'{value:.9g}' for value in np.array(place_m) - at_m)
-        lines += [
-            f'  <link name="{name}_link"/>', f'  <joint name="{name}" type="revolute">',
-            f'    <parent link="{parent}"/><child link="{name}_link"/>',
-            f'    <origin xyz="{xyz}" rpy="0 0 0"/>',
-            f'    <axis xyz="{" ".join(map(str, axis))}"/>',
-            '    <limit lower="-3" upper="3" effort="1" velocity="1"/>', '  </joint>',
-        ]  # fmt: skip
-        parent, at_m = f'{name}_link', np.array(place_m)
-    xyz = ' '.join(f'{value:.9g}' for value in TIP_M - at_m)
-    rpy = f'0 {np.pi / 2:.15g} 0'
-    return '\n'.join(
-        [
-            *lines,
-            '  <link name="tool0"/>',
-            '  <joint name="flange" type="fixed">',
-            f'    <parent link="{parent}"/><child link="tool0"/>',
-            f'    <origin xyz="{xyz}" rpy="{rpy}"/>',
-            '  </joint>',
-            '</robot>',
-        ]
-    )
 
 
 def tip_poses(joints_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,8 +3,7 @@
 from functools import cache
 from pathlib import Path
 
-from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.inference.readings.campaign import Campaign
+import paint_deposition as pd
 from virtual_paint_shop.files import write
 from virtual_paint_shop.shop import generate
 
@@ -12,11 +11,11 @@ from virtual_paint_shop.shop import generate
 generated = cache(generate)
 
 
-def small_campaign(folder: Path, **options) -> Campaign:
+def small_campaign(folder: Path, **options) -> pd.Campaign:
     """Panel and door with a strong hidden drift of the air, unless options say otherwise."""
     chosen = {
         'seed': 7, 'truth': 'air_drift', 'amplitude': 0.05, 'experiments': ('panel', 'door'),
         'readings': 40, 'repeats': 10, 'heldout': 1, 'style': 'columns', 'parcels': 100_000,
     } | options  # fmt: skip
     write(generated(**chosen), folder)
-    return read_campaign(folder / 'campaign.yaml')
+    return pd.read_campaign(folder / 'campaign.yaml')

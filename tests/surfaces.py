@@ -8,17 +8,15 @@ import trimesh
 from scipy.spatial import Delaunay
 
 from paint_deposition.part.edges import Edges
+from paint_deposition.part.surface import Surface
 
 Depth = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def triangulated(
-    depth: Depth,
-    spacing_m: float,
-    half_width_m: float = 0.2,
-    half_height_m: float | None = None,
+    depth: Depth, spacing_m: float, half_width_m: float = 0.2, half_height_m: float | None = None,
     jitter: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Vertices and faces of the surface y = depth(x, z), outward to -y.
 
     ``jitter`` moves the grid's vertices by that share of the spacing, those on the rim along it.
@@ -37,6 +35,31 @@ def triangulated(
     faces = faces[np.abs(doubled) > 1e-6 * spacing_m**2]
     x, z = flat.T
     return np.stack([x, depth(x, z), z], axis=1), faces
+
+
+def refined(depth: Depth, spacing_m: float, max_edge_length_m: float = 0.01, **shape) -> Surface:
+    """The surface of ``triangulated``, its edges no longer than that."""
+    return Surface.from_triangles(*triangulated(depth, spacing_m, **shape), max_edge_length_m)
+
+
+def flat(x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """A plane."""
+    return np.zeros_like(x)
+
+
+def cylinder(radius_m: float) -> Depth:
+    """Part of a level cylinder of signed radius, bulging toward the gun if positive."""
+    return lambda x, z: np.sign(radius_m) * (abs(radius_m) - np.sqrt(radius_m**2 - z**2))
+
+
+def ball(radius_m: float) -> Depth:
+    """Part of a ball of signed radius, bulging toward the gun if positive."""
+    return lambda x, z: np.sign(radius_m) * (abs(radius_m) - np.sqrt(radius_m**2 - x**2 - z**2))
+
+
+def fold(lean_rad: float) -> Depth:
+    """Two planes that meet at z = 0 and each lean back by an angle; negative: a groove."""
+    return lambda x, z: np.abs(z) * np.tan(lean_rad)
 
 
 def solid(

@@ -6,10 +6,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.campaign_file import _Band, _Entry, _File, read_campaign
-from paint_deposition.files.gauge_readings import read_readings
-from paint_deposition.files.model_file import read_model
+import paint_deposition as pd
+from paint_deposition.files.campaign_file import _Band, _Entry, _File
 from paint_deposition.files.motion_files import MOTION_KINDS
 from paint_deposition.files.zones_file import ZoneEntry
 
@@ -22,8 +20,8 @@ SAMPLES = PACKAGE / 'samples'
 
 
 def test_model_is_the_default_one_and_readings_are_readings():
-    assert read_model(CONFIG / 'model.yaml') == DepositionModel()
-    readings = read_readings(CONFIG / 'readings.csv')
+    assert pd.read_model(CONFIG / 'model.yaml') == pd.DepositionModel()
+    readings = pd.read_readings(CONFIG / 'readings.csv')
     assert len(readings) == 3
     assert len(set(readings.point)) == 2
     text = (CONFIG / 'readings.csv').read_text()
@@ -47,7 +45,7 @@ def test_campaign_names_every_key_and_can_be_read_with_all_of_them(tmp_path):
     assert set(_Entry.model_fields) - others <= set(entries[-1])
     campaign = tmp_path / 'campaign.yaml'
     campaign.write_text(text)
-    panel, door = read_campaign(campaign).experiments
+    panel, door = pd.read_campaign(campaign).experiments
     assert (panel.name, door.name, panel.zones) == ('panel', 'door', None)
     assert set(door.zones.names) == {'foot', 'skin'}
     written = (CONFIG / 'zones.yaml').read_text()

@@ -18,7 +18,7 @@ from paint_deposition.nodes.robot.controllers import OpcuaSource, RwsSource
 from paint_deposition.nodes.robot.egm_source import EgmSource
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.web_view import WebView
-from robot_arm import urdf
+from robot_arm import URDF
 
 PANEL = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
 PLACE = {'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], 'part_parent_frame': 'base'}
@@ -62,8 +62,7 @@ def test_policies_fit_the_nodes(repository, ros_context, executor, wait_until, t
     if name == 'run_recorder':
         values = values | {'output_directory': str(tmp_path)}
     if name == 'atomizer_source':
-        (tmp_path / 'arm.urdf').write_text(urdf())
-        values = values | {'urdf_file': str(tmp_path / 'arm.urdf')}
+        values = values | {'urdf_file': str(URDF)}
     node = node_class(context=ros_context, parameter_overrides=parameters(**values))
     executor.add_node(node)
     rules = allowed(repository, name)

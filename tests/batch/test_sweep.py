@@ -1,21 +1,28 @@
-"""A sweep: the films of single runs, and what was finished before is not computed again."""
+"""A sweep: what it varies, the films of single runs, and nothing computed twice."""
 
 import hashlib
 import json
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import yaml
+from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
-from booth import SAMPLES
+from booth import SAMPLES, spot
 from cli.command import assert_refused, paint
+from paint_deposition.batch import sweep_file
 from paint_deposition.batch.cases import compute, workers
 from paint_deposition.batch.job import Job, computed
 from paint_deposition.batch.sweep_file import SweepFile, varied_motion
 from paint_deposition.effects.catalogue import effects_allowed
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import BatchError
+from paint_deposition.model.eq1_pattern import Brush, PlanarPattern
+from paint_deposition.motion.path_builder import spray_path
 
 DOOR = SAMPLES / 'measured_door'
 EDGE_M = 0.08
@@ -28,7 +35,7 @@ TOLD = {
 
 
 @pytest.fixture
-def sweep_file(tmp_path):
+def sweep_path(tmp_path):
     path = tmp_path / 'sweep.yaml'
     inputs = {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory', 'readings')}
     path.write_text(yaml.safe_dump(TOLD | inputs))
@@ -60,9 +67,9 @@ def by_itself():
 
 
 @pytest.mark.slow
-def test_films_are_those_of_single_runs_by_any_executor(sweep_file, tmp_path, by_itself):
+def test_films_are_those_of_single_runs_by_any_executor(sweep_path, tmp_path, by_itself):
     with ThreadPoolExecutor(2) as threads:
-        found = pd.sweep(sweep_file, tmp_path / 'out', threads)
+        found = pd.sweep(sweep_path, tmp_path / 'out', threads)
     for values, row in zip(found.job.values, found.table.to_pylist(), strict=True):
         planar = pd.DepositionModel().planar
         planar = planar.model_copy(update={'K1_cm3_per_s': values['planar.K1_cm3_per_s']})
@@ -73,15 +80,15 @@ def test_films_are_those_of_single_runs_by_any_executor(sweep_file, tmp_path, by
 
 
 @pytest.mark.slow
-def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path, at_worker):
+def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_path, tmp_path, at_worker):
     output = tmp_path / 'out'
-    told = json.loads(paint('sweep', sweep_file, '-o', output, *at_worker, '--json').stdout)
+    told = json.loads(paint('sweep', sweep_path, '-o', output, *at_worker, '--json').stdout)
     assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
     assert told['judged_by'] == 'sigma_n'
     first = pq.read_table(output / 'cases.parquet')
     kept = sorted((output / 'finished').iterdir())
     kept[2].unlink()
-    again = json.loads(paint('sweep', sweep_file, '-o', output, *at_worker, '--json').stdout)
+    again = json.loads(paint('sweep', sweep_path, '-o', output, *at_worker, '--json').stdout)
     assert again['computed'] == 1
     assert pq.read_table(output / 'cases.parquet').equals(first)
     assert first['speed_factor'].to_pylist() == SPEEDS * 2
@@ -177,3 +184,105 @@ def test_a_users_own_effect_travels_to_processes_that_have_not_its_file(
     assert weaker['mean_um'] < as_told['mean_um']
     file.write_text(OWN.replace('1.0 + ', '1.5 + '))
     assert Job.of(sweep, DOOR).cases[0].digest != job.cases[0].digest
+
+
+def swept(**told) -> list[dict]:
+    return sweep_file.variations(sweep_file.SweepFile.model_validate(told))
+
+
+def test_grid_cases_and_draws_are_combined():
+    found = swept(
+        grid={'index_m': [0.2, 0.3], 'planar.K2': {'first': 0.1, 'last': 0.2, 'steps': 3}},
+        cases=[{'effects': []}, {'standoff_m': 0.3}],
+        sample={'count': 5, 'vary': {'speed_m_per_s': {'uniform': [0.2, 0.4]}}},
+    )
+    assert len(found) == 2 * 3 * 2 * 5
+    assert sorted({values['planar.K2'] for values in found}) == [0.1, 0.15, 0.2]
+    assert all(0.2 <= values['speed_m_per_s'] <= 0.4 for values in found)
+    assert len({values['speed_m_per_s'] for values in found}) == 5
+
+
+def test_draws_repeat_with_their_seed_and_have_the_spread_asked_for():
+    sample = {'count': 4000, 'seed': 3, 'vary': {'speed_factor': {'normal': [1.0, 0.02]}}}
+    drawn = [values['speed_factor'] for values in swept(sample=sample)]
+    assert drawn == [values['speed_factor'] for values in swept(sample=sample)]
+    assert abs(np.mean(drawn) - 1.0) < 4 * 0.02 / 4000**0.5
+    assert np.std(drawn) == pytest.approx(0.02, rel=4 / 8000**0.5)
+
+
+@pytest.mark.parametrize(
+    ('told', 'words'),
+    [
+        ({'grid': {'K1_cm3_per_s': [1.0]}}, "did you mean 'planar.K1_cm3_per_s'"),
+        ({'grid': {'air_drift.shift_down': [0.1]}}, "did you mean 'air_drift.shift_down_m'"),
+        ({'grid': {'index_m': ['wide']}}, "index_m is 'wide'; expected a number"),
+        ({'grid': {'index_m': [-0.1]}}, 'index_m is -0.1; expected a number above 0'),
+        ({'grid': {'part_pose': [[0, 0, 0]]}}, 'seven numbers'),
+        ({'grid': {'index_m': [0.1]}, 'cases': [{'index_m': 0.2}]}, 'index_m varies twice'),
+        ({'sample': {'count': 10}, 'grid': {'index_m': [0.1] * 200_000}}, '2000000 cases'),
+    ],
+)
+def test_what_makes_no_sense_is_refused(told, words):
+    with pytest.raises(BatchError, match=words.replace('(', r'\(')):
+        swept(**told)
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('mesh: a.stl', 'nothing varies; give one of grid, cases, sample'),
+        ('gird: {index_m: [0.1]}', "unknown key 'gird'; did you mean 'grid'"),
+        ('grid: {index_m: 0.1}', 'index_m is 0.1; expected a list of at least one value'),
+        ('grid: {index_m: {first: 1}}', 'first: A, last: B, steps: N'),
+        ('sample: {vary: {}}', "has no 'sample.count'; give how many draws"),
+        ('sample: {count: 2, vary: {index_m: {normal: [1, -1]}}}', 'standard deviation'),
+        ('grid: {index_m: [0.1]}\ngrid: {}', 'grid'),
+        ('[]', 'is not a sweep'),
+    ],
+)
+def test_a_sweep_file_is_refused_in_a_line(tmp_path, text, words):
+    path = tmp_path / 'sweep.yaml'
+    path.write_text(text)
+    with pytest.raises(BatchError) as refused:
+        sweep_file.read_sweep(path)
+    assert words in str(refused.value)
+    assert str(path) in str(refused.value)
+    assert '\n' not in str(refused.value)
+
+
+def test_a_model_is_varied_and_its_bounds_hold():
+    varied = sweep_file.varied_model(
+        DepositionModel(), {'planar.K1_cm3_per_s': 2.5, 'air_drift.shift_down_m': 0.02}
+    )
+    assert varied.planar.K1_cm3_per_s == 2.5
+    assert varied.effect('air_drift').shift_down_m == 0.02
+    assert sweep_file.varied_model(varied, {'effects': []}).effects == ()
+    with pytest.raises(BatchError, match=r'K2 is 1\.5'):
+        sweep_file.varied_model(DepositionModel(), {'planar.K2': 1.5})
+    with pytest.raises(BatchError, match="the model has no effect 'sag'; it has: none"):
+        sweep_file.varied_model(DepositionModel(), {'effects': ['sag']})
+
+
+def test_a_pattern_of_brushes_is_varied_brush_by_brush():
+    model = DepositionModel.of_brushes([Brush(number=k, planar=PlanarPattern()) for k in (1, 4)])
+    file = sweep_file.SweepFile.model_validate({'grid': {'brush_4.K1_cm3_per_s': [2.5]}})
+    (values,) = sweep_file.variations(file, [model])
+    first, other = sweep_file.varied_model(model, values).patterns
+    assert (first, other.K1_cm3_per_s) == (PlanarPattern(), 2.5)
+    with pytest.raises(BatchError, match=r'vary brush_1\.K2 or brush_4\.K2'):
+        sweep_file.varied_model(model, {'planar.K2': 0.2})
+    with pytest.raises(BatchError, match="no effect 'brush_4' is in"):
+        sweep_file.variations(file)
+
+
+def test_a_motion_runs_faster_further_off_and_with_more_flow():
+    motion = spot()
+    assert sweep_file.varied_motion(motion) is motion
+    twice, _ = spray_path(sweep_file.varied_motion(motion, speed_factor=2.0))
+    assert twice.spraying_time_s == pytest.approx(0.5 * spray_path(motion)[0].spraying_time_s)
+    further = sweep_file.varied_motion(motion, standoff_change_m=0.01)
+    tool_z = Rotation.from_quat(motion.quaternions_xyzw).as_matrix()[:, :, 2]
+    moved = ((motion.positions_m - further.positions_m) * tool_z).sum(axis=1)
+    assert moved == pytest.approx(0.01)
+    path, _ = spray_path(sweep_file.varied_motion(motion, flow_factor=1.1))
+    assert path.flow.max() == pytest.approx(1.1)

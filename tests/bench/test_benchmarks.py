@@ -7,23 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks import scores
 from benchmarks.diagnosis import main as score_the_diagnosis
 from benchmarks.live import ages_s
 from benchmarks.page import page_of, with_output
 from benchmarks.records import add
-from benchmarks.scores import (
-    Row,
-    expected_calibration_error,
-    failures,
-    groups,
-    interval,
-    mistakes,
-    named_all,
-    naming,
-    reliability,
-    table,
-    wrong,
-)
 from click.testing import CliRunner
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -110,27 +98,27 @@ def found(rows, label):
 
 
 def test_groups_are_those_accepted_and_no_learned_laws():
-    assert groups(RIGHT) == [{'edge_build', 'corner_slowdown'}]
-    assert groups(LISTED) == wrong(RIGHT) == []
-    assert groups(WRONG) == wrong(WRONG) == [{'sag'}]
+    assert scores.groups(RIGHT) == [{'edge_build', 'corner_slowdown'}]
+    assert scores.groups(LISTED) == scores.wrong(RIGHT) == []
+    assert scores.groups(WRONG) == scores.wrong(WRONG) == [{'sag'}]
 
 
 def test_naming_counts_strong_effects_and_a_pair_where_both_are_strong():
-    rows = naming([RIGHT, LISTED, WRONG, BLAMED, result('e', strength=3.0)])
+    rows = scores.naming([RIGHT, LISTED, WRONG, BLAMED, result('e', strength=3.0)])
     assert found(rows, 'effect in the group named, over 8 sd') == [True, False, False]
     assert found(rows, 'named or listed') == [True, True, True]
     assert found(rows, 'named at 2 to 4 sd') == [False]
     pair = {'kind': 'pair', 'hidden': ['sag', 'edge_build'], 'strengths': [9.0, 20.0]}
     classes = [group(1.0, 'sag'), group(1.0, 'edge_build')]
     both = result('p', accepted=['sag', 'edge_build'], classes=classes, **pair)
-    rows = naming([both, WRONG | pair, both | {'strengths': [7.0, 20.0]}])
-    assert named_all(both)
+    rows = scores.naming([both, WRONG | pair, both | {'strengths': [7.0, 20.0]}])
+    assert scores.named_all(both)
     assert found(rows, 'both of two effects, each over 8 sd') == [True, False]
     assert found(rows, 'at least one') == [True, True]
 
 
 def test_mistakes_are_counted_per_campaign():
-    rows = mistakes([RIGHT, LISTED, WRONG, BLAMED])
+    rows = scores.mistakes([RIGHT, LISTED, WRONG, BLAMED])
     assert found(rows, 'wrong effects accepted, per campaign') == [0, 0, 1, 1]
     assert found(rows, 'unknown cause blamed on an effect') == [True]
 
@@ -138,18 +126,18 @@ def test_mistakes_are_counted_per_campaign():
 def test_failures_are_strong_causes_not_named_and_effects_wrongly_accepted():
     weak = result('e', strength=3.0)
     crash = {'case': 'f', 'kind': 'clean', 'error': 'ValueError: x'}
-    lines = failures([RIGHT, LISTED, WRONG, BLAMED, weak, crash]).splitlines()
+    lines = scores.failures([RIGHT, LISTED, WRONG, BLAMED, weak, crash]).splitlines()
     assert [line[0] for line in lines] == ['f', 'b', 'c', 'd']
-    assert '6 campaigns, 1 errors' in table([RIGHT, LISTED, WRONG, BLAMED, weak, crash])
+    assert '6 campaigns, 1 errors' in scores.table([RIGHT, LISTED, WRONG, BLAMED, weak, crash])
 
 
 def test_what_is_stated_is_compared_with_what_is_observed():
     every = [RIGHT, LISTED, WRONG, BLAMED]
-    (high,) = (line for line in reliability(every) if line.startswith('  0.80 to 0.95'))
+    (high,) = (line for line in scores.reliability(every) if line.startswith('  0.80 to 0.95'))
     # 0.9 right, 0.85 wrong: 0.875 stated, half observed.
     assert all(words in high for words in ('mean 0.88', '50.0 %', 'apart by 38 points'))
     # Bins: 0.1 right; 0.3 wrong; 0.5 right; 0.9 right and 0.85 wrong; 0.97 wrong.
-    error, count = expected_calibration_error(every)
+    error, count = scores.expected_calibration_error(every)
     assert count == 6
     assert error == pytest.approx((0.9 + 0.3 + 0.5 + 2 * 0.375 + 0.97) / 6)
 
@@ -161,7 +149,7 @@ def test_an_interval_covers_as_often_as_it_says():
     for _ in range(50):
         shares = np.repeat(random.beta(2.0, 2.0, 40), 5)
         values = [(str(k // 5), float(v)) for k, v in enumerate(random.random(200) < shares)]
-        low, high = interval(values)
+        low, high = scores.interval(values)
         hits += low <= 0.5 <= high
     assert hits / 50 >= 0.86
 
@@ -169,5 +157,5 @@ def test_an_interval_covers_as_often_as_it_says():
 def test_never_is_not_known_from_few_campaigns():
     """Zero of three campaigns, however often redrawn: up to 1 - 0.025^(1/3)."""
     values = [(str(k % 3), 0.0) for k in range(60)]
-    assert interval(values) == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 3)))
-    assert 'none' in str(Row('nothing', []))
+    assert scores.interval(values) == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 3)))
+    assert 'none' in str(scores.Row('nothing', []))

@@ -3,6 +3,7 @@
 Figures that a command prints as JSON are held against `cli/outputs.py` every time.
 """
 
+import csv
 import io
 import json
 import subprocess
@@ -74,6 +75,12 @@ def level_pass(**changes) -> Trajectory:
 def film_in(folder: Path) -> np.ndarray:
     """The film of a folder of results [um]."""
     return np.genfromtxt(folder / 'film.csv', delimiter=',', names=True)['thickness_um']
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """The rows of a table, by its headings."""
+    with path.open(newline='') as file:
+        return list(csv.DictReader(file))
 
 
 def sheet(x: np.ndarray, y: np.ndarray, z: np.ndarray, path):

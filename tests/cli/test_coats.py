@@ -10,12 +10,9 @@ import yaml
 import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
 from brushes import NARROW, WIDE
-from cli.command import paint, ran
+from cli.command import paint, ran, rows_of
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.sag import Sag
-from paint_deposition.errors import PaintError
-from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.model.eq1_pattern import Brush
@@ -41,7 +38,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp('coats')
     for (name, motion), model in zip(COATS.items(), TWO_PAINTS, strict=True):
         write_pose_bag(folder / name, motion)
-        write_model(folder / f'{name}.yaml', model)
+        pd.write_model(folder / f'{name}.yaml', model)
     return folder
 
 
@@ -109,7 +106,7 @@ def test_each_coat_has_a_column_its_figures_and_its_wet_film(folder, tmp_path):
 def test_a_campaign_predicts_each_layer_as_simulate_does(folder, wet_on_wet):
     model = pd.DepositionModel().with_effect(Sag(run_m=0.01))
     taken_um = write_readings(folder, model, LAYERS, wet_on_wet=wet_on_wet)
-    read = read_campaign(campaign(folder, ({}, {'wet_on_wet': wet_on_wet})))
+    read = pd.read_campaign(campaign(folder, ({}, {'wet_on_wet': wet_on_wet})))
     assert [one.name for one in read.experiments] == [
         f'panel: {x}' for x in (*LAYERS[:2], 'total')
     ]
@@ -122,16 +119,16 @@ def test_a_campaign_predicts_each_layer_as_simulate_does(folder, wet_on_wet):
 def test_wet_readings_are_dried_by_the_solids_of_their_coat(folder):
     taken_um = write_readings(folder, pd.DepositionModel(), LAYERS[:2])
     solids = {'solids': 0.5}, {'solids': 0.25}
-    dried = read_campaign(campaign(folder, solids, wet=True, under_um=3.0)).readings
+    dried = pd.read_campaign(campaign(folder, solids, wet=True, under_um=3.0)).readings
     expected_um = np.repeat([0.5, 0.25], 48) * taken_um
     assert dried.thickness_um == pytest.approx(expected_um)
-    with pytest.raises(PaintError, match="the solids of layer 'base' are not said; give"):
-        read_campaign(campaign(folder, wet=True))
+    with pytest.raises(pd.PaintError, match="the solids of layer 'base' are not said; give"):
+        pd.read_campaign(campaign(folder, wet=True))
     write_readings(folder, pd.DepositionModel(), ['total'])
-    with pytest.raises(PaintError, match="the solids of layer 'total' differ; give"):
-        read_campaign(campaign(folder, solids, wet=True))
+    with pytest.raises(pd.PaintError, match="the solids of layer 'total' differ; give"):
+        pd.read_campaign(campaign(folder, solids, wet=True))
     # With a known film below: it is part of what was read of all coats.
-    below = [read_campaign(campaign(folder, under_um=um)).readings for um in (0.0, 3.0)]
+    below = [pd.read_campaign(campaign(folder, under_um=um)).readings for um in (0.0, 3.0)]
     assert below[0].thickness_um - below[1].thickness_um == pytest.approx(np.full(48, 3.0))
 
 
@@ -147,16 +144,16 @@ def test_wet_readings_are_dried_by_the_solids_of_their_coat(folder):
 def test_layers_that_no_coat_has_are_refused(folder, header, layer, more, message):
     rows = f'0,0,0,9,{layer}\n0.1,0,0,9,'
     (folder / 'readings.csv').write_text(f'x_m,y_m,z_m,DFT,{header}\n{rows}\n')
-    with pytest.raises(PaintError, match=message):
-        read_campaign(campaign(folder, **more))
+    with pytest.raises(pd.PaintError, match=message):
+        pd.read_campaign(campaign(folder, **more))
 
 
 def test_a_column_of_wet_film_tells_the_remedy(folder):
     (folder / 'readings.csv').write_text('x_m,y_m,z_m,Nassschichtdicke [µm]\n0,0,0,40\n')
-    with pytest.raises(PaintError, match=r'is a wet film: say wet: true, give its solids'):
-        read_campaign(campaign(folder))
+    with pytest.raises(pd.PaintError, match=r'is a wet film: say wet: true, give its solids'):
+        pd.read_campaign(campaign(folder))
     named = {'columns': {'thickness': 'Nassschichtdicke [µm]'}, 'wet': True, 'solids': 0.5}
-    readings = read_campaign(campaign(folder, **named)).readings
+    readings = pd.read_campaign(campaign(folder, **named)).readings
     assert readings.thickness_um.tolist() == [20.0]
 
 
@@ -174,16 +171,16 @@ def test_layers_tell_what_parts_of_one_coat_each_tell(folder, tmp_path):
         (tmp_path / f'{name}.csv').write_text('\n'.join([header, *of_layer]))
         entries.append({'name': name, 'mesh': str(PANEL), 'measurements': f'{name}.csv'} | laid)
     (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump({'experiments': entries}))
-    layered, apart = map(read_campaign, (campaign(folder), tmp_path / 'campaign.yaml'))
+    layered, apart = map(pd.read_campaign, (campaign(folder), tmp_path / 'campaign.yaml'))
     for model, off in ((hidden, False), (pd.DepositionModel(), True)):
         one, other = (pd.compare(each, model).points for each in (layered, apart))
         assert one.residual_um == pytest.approx(other.residual_um, abs=1e-9)
         assert one.sigma_um == pytest.approx(other.sigma_um, rel=1e-9)
         assert (one.rmse_um > 1.0) == off
-    write_model(tmp_path / 'hidden.yaml', hidden)
+    pd.write_model(tmp_path / 'hidden.yaml', hidden)
     ran('compare', campaign(folder), '--model', tmp_path / 'hidden.yaml', '-o', tmp_path)
-    header, *rows = (tmp_path / 'residuals.csv').read_text().splitlines()
-    assert header.endswith(',layer')
-    assert {(row.split(',')[0], row.split(',')[-1]) for row in rows} == {
+    rows = rows_of(tmp_path / 'residuals.csv')
+    assert list(rows[0])[-1] == 'layer'
+    assert {(row['experiment'], row['layer']) for row in rows} == {
         ('panel: base', 'base'), ('panel: total', 'total')
     }  # fmt: skip

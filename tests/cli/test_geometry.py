@@ -16,7 +16,6 @@ from booth import SAMPLES, serpentine
 from cli.command import COARSE, TRIGGER, assert_refused, figures_of, paint, ran, sheet
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.motion.trajectory import Trajectory
 
 
 @pytest.fixture(scope='module')
@@ -32,7 +31,7 @@ def surface(panel):
     return pd.read_mesh(panel, max_edge_length_m=0.1)
 
 
-def three_passes() -> Trajectory:
+def three_passes() -> pd.Trajectory:
     """Three level passes over the panel at 0.25 m and 0.4 m/s, with a trigger."""
     return replace(
         serpentine((0.3, 0.0, -0.3), half_width_m=0.9, opens_at_m=0.7, speed_m_per_s=0.4),
@@ -40,19 +39,19 @@ def three_passes() -> Trajectory:
     )
 
 
-def shifted(x: float, y: float, z: float) -> Trajectory:
+def shifted(x: float, y: float, z: float) -> pd.Trajectory:
     motion = three_passes()
     return replace(motion, positions_m=motion.positions_m + np.array([x, y, z]))
 
 
-def tool_turned(axis: str, degrees: float) -> Trajectory:
+def tool_turned(axis: str, degrees: float) -> pd.Trajectory:
     motion = three_passes()
     turn = Rotation.from_euler(axis, degrees, degrees=True)
     turned = Rotation.from_quat(motion.quaternions_xyzw) * turn
     return replace(motion, quaternions_xyzw=turned.as_quat())
 
 
-def in_another_frame(degrees: float, origin_m) -> Trajectory:
+def in_another_frame(degrees: float, origin_m) -> pd.Trajectory:
     motion = three_passes()
     turn = Rotation.from_euler('z', degrees, degrees=True)
     return replace(
@@ -62,17 +61,17 @@ def in_another_frame(degrees: float, origin_m) -> Trajectory:
     )
 
 
-def triggered(flow: float = 1.0, later_s: float = 0.0) -> Trajectory:
+def triggered(flow: float = 1.0, later_s: float = 0.0) -> pd.Trajectory:
     motion = three_passes()
     stamps = motion.trigger_stamps_ns + int(1e9 * later_s)
     return replace(motion, trigger_stamps_ns=stamps, trigger_flow=flow * motion.trigger_flow)
 
 
-def in_millimetres(scale: float = 1000.0) -> Trajectory:
+def in_millimetres(scale: float = 1000.0) -> pd.Trajectory:
     return replace(three_passes(), positions_m=scale * three_passes().positions_m)
 
 
-def with_one_pass_above() -> Trajectory:
+def with_one_pass_above() -> pd.Trajectory:
     return serpentine((1.3, 0.3, 0.0, -0.3), half_width_m=0.9, opens_at_m=0.7, speed_m_per_s=0.4)
 
 
@@ -197,7 +196,7 @@ def test_the_samples_are_not_warned_of(mesh, bag):
 def campaign(panel, tmp_path):
     """Write a campaign: the panel, readings of a plausible film, and a motion."""
 
-    def written(motion: Trajectory):
+    def written(motion: pd.Trajectory):
         write_pose_bag(tmp_path / 'run', motion)
         x, z = (grid.ravel() for grid in np.meshgrid(np.linspace(-0.4, 0.4, 6), [-0.2, 0.0, 0.2]))
         y = 0.03 * ((x / 0.6) ** 2 + (z / 0.4) ** 2) - 0.03

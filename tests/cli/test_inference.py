@@ -1,6 +1,5 @@
 """`paint demo`, `compare`, `diagnose` and `refit` as a user runs them, on the sample door."""
 
-import csv
 import html
 import json
 import os
@@ -13,7 +12,7 @@ import pytest
 import yaml
 
 from booth import SAMPLES
-from cli.command import assert_refused, figures_of, paint, ran
+from cli.command import assert_refused, figures_of, paint, ran, rows_of
 from paint_deposition.cli.results import MARKER
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.inference.diagnosis.model_space import SURE
@@ -51,11 +50,6 @@ def door_alone(tmp_path_factory):
         'history: [{added: pattern, rmse_um: 9}, {added: a wish, rmse_um: 8}]\n'
     )
     return folder / 'campaign.yaml'
-
-
-def table(path) -> list[dict[str, str]]:
-    with path.open(newline='') as file:
-        return list(csv.DictReader(file))
 
 
 def content(file) -> dict:
@@ -156,8 +150,8 @@ def test_a_diagnosis_writes_all_that_it_says(demo):
         MARKER, 'diagnosis.json', 'model.yaml', 'model_before.yaml', 'residuals.csv',
         'report.html', 'comparison.png',
     }  # fmt: skip
-    rows = table(folder / 'residuals.csv')
-    readings = table(SAMPLES / 'measured_door/panel.csv') + table(
+    rows = rows_of(folder / 'residuals.csv')
+    readings = rows_of(SAMPLES / 'measured_door/panel.csv') + rows_of(
         SAMPLES / 'measured_door/door.csv'
     )
     measured = [f'{float(reading["thickness_um"]):.3f}' for reading in readings]
@@ -193,7 +187,7 @@ def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
 def test_a_slip_among_repeats_is_left_out_and_named(door_alone, tmp_path):
     """In every file and in print; the readings' own file says how it was."""
     header, *rows = (door_alone.parent / 'door.csv').read_text().splitlines()
-    readings = table(door_alone.parent / 'door.csv')
+    readings = rows_of(door_alone.parent / 'door.csv')
     labels = [reading['point'] for reading in readings]
     slip = next(k for k, label in enumerate(labels) if labels.count(label) == 3)
     text = readings[slip]['thickness_um']
@@ -215,7 +209,7 @@ def test_a_slip_among_repeats_is_left_out_and_named(door_alone, tmp_path):
         name = 'comparison' if command == ['compare'] else 'diagnosis'
         assert json.loads((output / f'{name}.json').read_text())['notes'][-1] == note
         assert f'point &#39;{labels[slip]}&#39;: ' in (output / 'report.html').read_text()
-        residuals = table(output / 'residuals.csv')
+        residuals = rows_of(output / 'residuals.csv')
         assert [row['point'] for row in residuals] == labels
         assert [row['used'] == '1' for row in residuals] == [k != slip for k in range(len(rows))]
         assert residuals[slip]['predicted_um'] == ''
@@ -279,7 +273,7 @@ def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(door_alon
     done = ran('compare', door_alone, '--model', output / 'model.yaml', '--model',
                tmp_path / 'own.yaml', '-o', tmp_path / 'both')  # fmt: skip
     learned, own = (
-        [float(r['residual_um']) for r in table(tmp_path / f'both/residuals_{name}.csv')]
+        [float(r['residual_um']) for r in rows_of(tmp_path / f'both/residuals_{name}.csv')]
         for name in ('model', 'own')
     )
     assert sum(r**2 for r in own) < 1.3 * sum(r**2 for r in learned)

@@ -8,10 +8,8 @@ from scipy.spatial.transform import Rotation
 import paint_deposition as pd
 from cli.command import COARSE, assert_refused, figures_of, film_in, level_pass, paint, ran
 from files.recorded import Messages, pose_entries, write_bag
-from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.part_frame import Rigid
-from paint_deposition.motion.trajectory import Trajectory
 
 # The part stands two metres before the robot, turned and leaning.
 PART_POSE = [2.1, -0.4, 0.9, *Rotation.from_euler('ZYX', [1.9, 0.3, -0.2]).as_quat().tolist()]
@@ -19,14 +17,14 @@ TOUCHED_POSE = Rigid.of([2.0, 0.5, 0.7, 0.0, 0.0, 0.6, 0.8])
 POINTS = {'A': [0, 0, 0], 'B': [900, 0, 10], 'C': [850, 40, 600], 'D': [30, 0, 550]}
 
 
-def seen_from_the_robot(frame_id: str = 'base_link') -> Trajectory:
+def seen_from_the_robot(frame_id: str = 'base_link') -> pd.Trajectory:
     """The same pass as the robot tells it."""
     at_part = level_pass(frame_id=frame_id)
     poses = Rigid.of(PART_POSE).applied(at_part.positions_m, at_part.quaternions_xyzw)
-    return Trajectory(at_part.stamps_ns, *poses, frame_id)
+    return pd.Trajectory(at_part.stamps_ns, *poses, frame_id)
 
 
-def brought_to_the_part(path, **options) -> Trajectory:
+def brought_to_the_part(path, **options) -> pd.Trajectory:
     """A recording as it is read, its poses those of the pass before the part."""
     read, expected = pd.read_recording(path, **options), level_pass()
     assert np.allclose(read.positions_m, expected.positions_m, atol=1e-6)
@@ -81,7 +79,7 @@ def test_poses_of_another_frame_are_warned_of_with_both_names(tmp_path):
 )
 def test_a_named_frame_that_nothing_leads_to_is_refused(options, words, tmp_path):
     bag = write_pose_bag(tmp_path / 'run', seen_from_the_robot())
-    with pytest.raises(PaintError) as refused:
+    with pytest.raises(pd.PaintError) as refused:
         pd.read_recording(bag, **options)
     assert all(word in str(refused.value) for word in words)
 
@@ -119,7 +117,7 @@ def test_where_a_node_was_told_that_the_part_stands_is_used_but_not_guessed(tmp_
     (note,) = brought_to_the_part(once).notes
     assert note.startswith("static transforms: poses brought from 'base_link' to 'part', ")
     anew = placed_bag(tmp_path / 'anew', '/part_pose', (0, PART_POSE), (50, [2.2, *PART_POSE[1:]]))
-    with pytest.raises(PaintError, match=r"'part' was moved in 'base_link'.*--part-pose"):
+    with pytest.raises(pd.PaintError, match=r"'part' was moved in 'base_link'.*--part-pose"):
         pd.read_recording(anew)
 
 
@@ -134,7 +132,7 @@ def test_a_part_on_a_conveyor_is_followed(tmp_path):
         for place, *pose in zip(places, at_part.positions_m, at_part.quaternions_xyzw, strict=True)
     ]
     stamps = at_part.stamps_ns
-    seen = Trajectory(stamps, *map(np.array, zip(*poses, strict=True)), 'base_link')
+    seen = pd.Trajectory(stamps, *map(np.array, zip(*poses, strict=True)), 'base_link')
 
     def run(name: str, first: int):
         told = [

@@ -10,7 +10,6 @@ from rosbags.highlevel import AnyReader
 import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import ran
-from paint_deposition.files.model_file import read_model
 from paint_deposition.files.provenance import model_digest, model_of_plan, origin, planned_model
 from paint_deposition.motion.programmed import PROGRAMMED
 
@@ -131,13 +130,13 @@ def test_a_module_away_from_its_model_is_warned_of(plan, tmp_path):
 
 
 def test_the_digest_is_that_of_the_values(model_file, tmp_path):
-    model = read_model(model_file)
+    model = pd.read_model(model_file)
     expected = model_digest(model)
     assert origin(model)['models']['model']['sha256'] == expected
 
     def digest(text: str) -> str:
         (tmp_path / 'again.yaml').write_text(text)
-        return model_digest(read_model(tmp_path / 'again.yaml'))
+        return model_digest(pd.read_model(tmp_path / 'again.yaml'))
 
     assert digest(f'# a comment\n{MODEL}') == expected
     assert digest(MODEL.replace('0.12', '0.120')) == expected

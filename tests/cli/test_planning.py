@@ -1,32 +1,35 @@
-"""`paint calibrate`, `paint recommend` and `paint plan` as a user runs them."""
+"""`paint calibrate`, `recommend`, `plan`, `improve` and `measure` as a user runs them."""
 
+import csv
 import json
 
 import numpy as np
 import pytest
 import trimesh
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
+import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import assert_refused, paint, ran
+from cli.command import assert_refused, figures_of, film_in, paint, ran, rows_of, sheet
 from folded_parts import hood
 from paint_deposition.cli.results import MARKER
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.model_file import read_model, write_model
-from paint_deposition.files.motion_files import read_recording
+from paint_deposition.errors import ReadingsError
 from paint_deposition.files.rapid.program import read_program
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest
 
 STUDY = SAMPLES / 'panel_study'
-MODEL = DepositionModel(planar=PlanarPattern(K3=0.1))
+MODEL = pd.DepositionModel(planar=PlanarPattern(K3=0.1))
 
 
 @pytest.fixture(scope='module')
 def model_file(tmp_path_factory):
     path = tmp_path_factory.mktemp('model') / 'model.yaml'
-    write_model(path, MODEL)
+    pd.write_model(path, MODEL)
     return path
 
 
@@ -85,7 +88,7 @@ def test_impossible_recommendations_are_refused(arguments, words, tmp_path):
 def test_calibration_writes_model_figures_and_pictures(calibrated):
     done, folder = calibrated
     assert done.returncode == 0, done.stderr
-    model = read_model(folder / 'model.yaml')
+    model = pd.read_model(folder / 'model.yaml')
     assert model.planar.K1_cm3_per_s == pytest.approx(0.653, rel=0.02)
     content = json.loads((folder / 'calibration.json').read_text())
     assert content['experiments'][0]['residual_sd_um'] < 0.75
@@ -119,7 +122,7 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     }  # fmt: skip
     program = read_program(tmp_path / 'plan' / 'passes.mod')
     assert {'paintl', 'movel'} <= {move.instruction for move in program.moves}
-    assert len(read_recording(tmp_path / 'plan' / 'trajectory')) > 1000
+    assert len(pd.read_recording(tmp_path / 'plan' / 'trajectory')) > 1000
     assert is_picture(tmp_path / 'plan' / 'film.png')
 
 
@@ -171,3 +174,142 @@ def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(folded, tmp
 def test_an_angle_that_is_none_is_refused(folded, tmp_path):
     options = ('--faces', 'auto', '--target-um', 20, '--face-angle-deg', 90)
     assert_refused(paint('plan', '--mesh', folded, *options, '-o', tmp_path / 'plan'), '90')
+
+
+DOOR_MESH, BAG = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
+COARSE = ('--max-edge-length-m', 0.06)
+RECORDED = ('--mesh', DOOR_MESH, '--trajectory', BAG, '--state-topic', '/atomizer/state', *COARSE)
+
+
+@pytest.fixture(scope='module')
+def improved(tmp_path_factory):
+    """The recorded door improved, with what was printed."""
+    folder = tmp_path_factory.mktemp('improved') / 'out'
+    done = ran('improve', *RECORDED, '--json', '-o', folder)
+    return folder, json.loads(done.stdout)
+
+
+@pytest.mark.slow
+def test_files_and_figures(improved):
+    folder, figures = improved
+    assert figures['sigma_n']['after'] < 0.8 * figures['sigma_n']['before']
+    assert figures['mean_um']['after'] == pytest.approx(figures['mean_um']['before'], rel=0.01)
+    assert figures['program_difference'] < 2e-3
+    assert [one['number'] for one in figures['passes']] == [1, 2, 3]
+    assert 'm/s on average' in figures['passes'][0]['sentence']
+    assert {'mesh', 'trajectory'} <= {file['what'] for file in figures['provenance']['files']}
+    for name in ('trajectory', 'passes.csv', 'passes.mod', 'model.yaml', 'film.ply'):
+        assert (folder / name).exists()
+    with Image.open(folder / 'improvement.png') as image:
+        assert image.width > 1000
+
+
+@pytest.mark.slow
+def test_the_film_is_that_of_the_written_files(improved):
+    """The bag to the last digits, module and table within what the command says of them."""
+    folder, figures = improved
+    surface = pd.read_mesh(DOOR_MESH, max_edge_length_m=COARSE[1])
+    model = pd.read_model(folder / 'model.yaml')
+    expected = film_in(folder)
+    within = figures['program_difference'] + 1e-4
+    for name, share in (('trajectory', 1e-5), ('passes.mod', within), ('passes.csv', within)):
+        film = pd.simulate(surface, pd.read_recording(folder / name), model).film_um
+        assert np.abs(film - expected).max() < share * expected.max(), name
+
+
+@pytest.mark.parametrize(
+    ('more', 'words'),
+    [
+        (('--speed-min', 0.5, '--speed-max', 0.2), ('--speed-min is 0.5, above --speed-max',)),
+        (('--flow', 0, 1), ('--flow', '0.0')),
+        (('--acceleration', 'fast'), ('fast',)),
+        (('--gun-signal', 'doGun'), ('--gun-signal is for RAPID modules',)),
+    ],
+)
+def test_refusals(more, words, tmp_path):
+    assert_refused(paint('improve', *RECORDED, *more, '-o', tmp_path / 'out'), *words)
+
+
+@pytest.mark.slow
+def test_optimised_plans_waste_less_for_the_same_film(tmp_path):
+    """A curved sheet of 0.6 x 0.7 m, narrower than the spray of two passes."""
+    x, z = np.meshgrid(np.linspace(-0.3, 0.3, 13), np.linspace(-0.35, 0.35, 15), indexing='ij')
+    fender = sheet(x, 0.5 * x**2 + 0.35 * z**2, z, tmp_path / 'fender.stl')
+    options = ('--target-um', 20, '--optimise', '--max-edge-length-m', 0.06, '--json')
+    told = figures_of('plan', '--mesh', fender, *options, '-o', tmp_path / 'out')
+    plain, film = told['plain'], told['film']
+    assert told['passes'] <= plain['passes']
+    assert film['emitted_volume_cm3'] < 0.92 * plain['paint_cm3']
+    assert film['capture_fraction'] > 1.08 * plain['capture_fraction']
+    assert film['mean_um'] == pytest.approx(20.0, rel=0.01)
+    assert told['sigma_n'] < 0.06
+
+
+UNPAINTED = ('--mesh', SAMPLES / 'door.stl', '--max-edge-length-m', 0.05)
+PAINTED = (*UNPAINTED, '--trajectory', SAMPLES / 'door_horizontal')
+
+
+@pytest.fixture(scope='module')
+def measured(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('measured')
+    done = ran('measure', *PAINTED, '--points', 30, '-o', folder)
+    return folder, done
+
+
+@pytest.mark.slow
+def test_points_are_written_for_people_and_robots(measured):
+    folder, done = measured
+    figures = json.loads((folder / 'measure.json').read_text())
+    rows, poses = rows_of(folder / 'points.csv'), rows_of(folder / 'poses.csv')
+    assert [row['point'] for row in rows] == [p['point'] for p in figures['points']] + figures[
+        'read_twice'
+    ]
+    assert len(poses) == len(figures['points']) == 30
+    assert 'detected with a probability' in done.stdout
+    for pose, point in zip(poses, figures['points'], strict=True):
+        turn = Rotation.from_quat([float(pose[q]) for q in ('qx', 'qy', 'qz', 'qw')])
+        np.testing.assert_allclose(turn.apply([0, 0, 1]), -np.array(point['normal']), atol=1e-6)
+    with Image.open(folder / 'points.png') as picture:
+        assert picture.width > 1000
+
+
+@pytest.mark.slow
+def test_the_filled_table_is_gauge_readings_and_the_empty_one_is_refused(measured, tmp_path):
+    folder, _ = measured
+    surface, path = pd.read_mesh(SAMPLES / 'door.stl'), tmp_path / 'readings.csv'
+    path.write_text((folder / 'points.csv').read_text())
+    with pytest.raises(ReadingsError, match='no readings below the header'):
+        pd.read_readings(path, surface=surface)
+    rows = rows_of(path)
+    with path.open('w', newline='') as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(row | {'thickness_um': row['expected_um']} for row in rows)
+    readings = pd.read_readings(path, surface=surface)
+    assert (len(readings), len(set(readings.point))) == (38, 30)
+    assert surface.locate(readings.positions_m).distance_m.max() < 1e-3
+
+
+@pytest.mark.slow
+def test_poses_stand_in_the_frame_of_the_robot(measured, tmp_path):
+    pose = (1.0, 0.5, 0.0, 0, 0, 1, 0)
+    # The same motion, given in the robot's frame: the part is turned by half a turn there.
+    motion = moved(pd.read_recording(SAMPLES / 'door_horizontal'), Rigid.of(pose), 'base_link')
+    figures = figures_of(
+        'measure', *UNPAINTED, '--trajectory', write_pose_bag(tmp_path / 'run', motion),
+        '--part-pose', *pose, '--points', 12, '--repeats', 0, '--json', '-o', tmp_path / 'out',
+    )  # fmt: skip
+    first = rows_of(tmp_path / 'out/poses.csv')[0]
+    assert float(first['x_m']) == pytest.approx(1.0 - figures['points'][0]['x_m'], abs=1e-5)
+    assert figures['read_twice'] == []
+
+
+@pytest.mark.slow
+def test_without_a_trajectory_passes_are_planned(tmp_path):
+    done = ran('measure', *UNPAINTED, '--target-um', 25, '--points', 16, '--json', '-o', tmp_path)
+    films = [point['expected_um'] for point in json.loads(done.stdout)['points']]
+    assert np.mean(films) == pytest.approx(25.0, rel=0.2)
+
+
+def test_a_part_that_nobody_paints_is_refused(tmp_path):
+    assert_refused(paint('measure', *UNPAINTED, '-o', tmp_path), '--trajectory', '--target-um')

@@ -42,7 +42,8 @@ def test_the_calibration_is_the_prior_of_the_next_job(folder: Path, tmp_path: Pa
     assert known.names == tuple(coordinate.name for coordinate in PATTERN)
     # The sample's bell has the pattern of eq. (1).
     size, factor = known.footprint
-    assert size < 0.06 and factor > 1.0
+    assert size < 0.06
+    assert factor > 1.0
     text, figures = refitted(folder, 'door.yaml', 'calibration/model.yaml', tmp_path)
     shift = figures['pattern_shift']
     assert set(shift) == {'standard_deviations', 'usual', 'by_coordinate'}

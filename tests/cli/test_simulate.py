@@ -1,19 +1,17 @@
-"""`paint simulate` over real files, as a user runs it."""
+"""`paint simulate` over real files, as a user runs it, and zones."""
 
 import json
 
 import numpy as np
 import pytest
 import trimesh
+import yaml
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint, ran
+from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint, ran, rows_of
 from paint_deposition.cli.results import MARKER
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.gauge_gain import GaugeGain
-from paint_deposition.files.model_file import write_model
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
@@ -57,12 +55,12 @@ def test_the_door_is_painted(painted_door):
 @pytest.mark.slow
 def test_the_figures_say_how_it_was_painted(painted_door):
     _, figures = painted_door
-    recorded = read_recording(DOOR_BAG, None, '/atomizer/state')
+    recorded = pd.read_recording(DOOR_BAG, None, '/atomizer/state')
     assert (figures['poses']['received'], figures['poses']['rejected']) == (len(recorded), 0)
     changes = recorded.trigger_stamps_ns[1:]
     on_s = np.sum(changes[1::2] - changes[0::2]) * 1e-9
     assert figures['spraying_time_s'] == pytest.approx(on_s, rel=1e-9)
-    emitted = DepositionModel().planar.K1_cm3_per_s * on_s
+    emitted = pd.DepositionModel().planar.K1_cm3_per_s * on_s
     assert figures['emitted_volume_cm3'] == pytest.approx(emitted, rel=1e-9)
     share = figures['painted_volume_cm3'] / emitted
     assert figures['capture_fraction'] == pytest.approx(share, rel=1e-9)
@@ -83,8 +81,8 @@ def test_predictions_are_exact_at_the_readings(panel, one_pass, tmp_path):
             for k, (a, b) in enumerate(zip(x, z, strict=True))
         )
     )
-    model = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.2, K3=0.4, phi_rad=1.0))
-    write_model(tmp_path / 'model.yaml', model)
+    model = pd.DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.2, K3=0.4, phi_rad=1.0))
+    pd.write_model(tmp_path / 'model.yaml', model)
     done = ran(
         'simulate', '--mesh', panel, '--trajectory', one_pass, '--model', tmp_path / 'model.yaml',
         '--at', readings, *COARSE, '-o', tmp_path / 'out',
@@ -107,10 +105,10 @@ def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel):
     places = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.1]])
     labels, unknown = np.array(['a', 'b']), np.full(2, np.nan)
     readings = pd.Readings(places, np.full(2, 9.0), labels, labels, unknown)
-    gauge = DepositionModel().with_effect(GaugeGain(gain=0.1))
+    gauge = pd.DepositionModel().with_effect(GaugeGain(gain=0.1))
     plain, read = (
         pd.simulate(surface, level_pass(), model, readings=readings)
-        for model in (DepositionModel(), gauge)
+        for model in (pd.DepositionModel(), gauge)
     )
     assert np.allclose(read.predicted_um, 1.1 * plain.predicted_um)
     assert np.array_equal(read.film_um, plain.film_um)
@@ -193,3 +191,75 @@ def test_a_log_with_a_gap_and_a_log_pasted_twice_are_warned_of_before_the_film(t
         assert line.startswith('warning: ')
         told = json.loads((tmp_path / name / 'stats.json').read_text())
         assert line.removeprefix('warning: ') in told['warnings']
+
+
+ZONES = """zones:
+  - {name: foot, target_um: 20, tolerance_um: 2, box: [[-2, -2, -2], [2, 2, 0.0]]}
+  - {name: 'head, left', target_um: 9, tolerance_um: 1, box: [[-2, -2, 0.0], [0, 2, 2]]}
+"""
+
+
+@pytest.fixture
+def zones(tmp_path):
+    path = tmp_path / 'zones.yaml'
+    path.write_text(ZONES)
+    return path
+
+
+def test_simulate_counts_each_zone_against_its_band(panel, one_pass, zones, tmp_path):
+    whole = (
+        'simulate', '--mesh', panel, '--trajectory', one_pass, *COARSE, '-o', tmp_path / 'out',
+    )  # fmt: skip
+    done = ran(*whole, '--zones', zones)
+    figures = json.loads((tmp_path / 'out/stats.json').read_text())
+    foot, head = figures['zones']
+    assert [foot['name'], head['name']] == ['foot', 'head, left']
+    assert (foot['target_um'], head['target_tolerance_um']) == (20.0, 1.0)
+    painted = [zone['coverage'] * zone['area_m2'] for zone in figures['zones']]
+    within = np.dot(painted, [zone['within_target'] for zone in figures['zones']]) / sum(painted)
+    assert figures['within_target'] == pytest.approx(within)
+    assert f'head, left, 9 ± 1 µm: {head["mean_um"]:.1f} µm mean' in done.stdout
+    rows = rows_of(tmp_path / 'out/film.csv')
+    assert list(rows[0])[4:] == ['zone']
+    assert {row['zone'] for row in rows} == {'foot', 'head, left', ''}
+    low = [row for row in rows if float(row['z_m']) <= 0.0]
+    assert low == [row for row in rows if row['zone'] == 'foot']
+    highest_um = max(float(row['thickness_um']) for row in low)
+    assert highest_um == pytest.approx(foot['max_um'])
+    zones.write_text(ZONES.replace('0.0]]}', '-1.0]]}'))
+    assert_refused(paint(*whole, '--zones', zones), "zone 'foot' holds no vertex of the part")
+
+
+@pytest.mark.slow
+def test_compare_tells_the_readings_of_each_zone(zones, tmp_path):
+    """By --zones, which stands for the campaign's own."""
+    sample = SAMPLES / 'measured_door'
+    campaign = yaml.safe_load((sample / 'unseen.yaml').read_text())
+    (door,) = campaign['experiments']
+    for key in ('mesh', 'trajectory', 'measurements'):
+        door[key] = str(sample / door[key])
+    file = tmp_path / 'campaign.yaml'
+    (tmp_path / 'other.yaml').write_text(ZONES.replace('0.0', '0.3').replace(' 20,', ' 22,'))
+    file.write_text(json.dumps(campaign | {'zones': 'other.yaml', 'model': 'bell.yaml'}))
+    (tmp_path / 'bell.yaml').write_text('{}')
+    done = ran('compare', file, '-o', tmp_path / 'out')
+    written = json.loads((tmp_path / 'out/comparison.json').read_text())
+    foot, _ = written['zones']
+    rows = rows_of(tmp_path / 'out/residuals.csv')
+    own = [row for row in rows if float(row['z_m']) <= 0.3 and row['used'] == '1']
+    film = np.array([float(row['thickness_um']) for row in own])
+    assert (foot['readings'], foot['target_um']) == (len(own), 22.0)
+    assert foot['mean_um'] == pytest.approx(film.mean(), abs=1e-3)
+    within = np.mean(np.abs(film - 22.0) <= 2.0)
+    assert foot['within'] == pytest.approx(within)
+    assert foot['verdict'] == f'{round((1 - within) * len(own))} of {len(own)} out'
+    predicted = np.mean([float(row['predicted_um']) for row in own])
+    assert foot['mean_predicted_um'] == pytest.approx(predicted, abs=1e-3)
+    assert abs(foot['worst_um'] - 22.0) == pytest.approx(np.abs(film - 22.0).max(), abs=1e-3)
+    assert 'door: foot, 22 ± 2 µm:' in done.stdout
+    page = (tmp_path / 'out/report.html').read_text()
+    assert '<h2 id="zones">Zones</h2>' in page
+    assert f'worst {foot["worst_um"]:.1f} µm at {foot["worst_point"]}' in page
+    zones.write_text(ZONES.replace('0.0]]}', '-1.0]]}'))
+    refused = paint('compare', file, '--zones', zones, '-o', tmp_path / 'out')
+    assert_refused(refused, "experiment 'door'", "zone 'foot' holds no vertex")

@@ -1,5 +1,6 @@
-"""What every effect must do, whatever its physics."""
+"""What every effect must do, whatever its physics, and what its sign does."""
 
+from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
@@ -7,26 +8,16 @@ import pytest
 from numba import float32, njit
 from pydantic import ValidationError
 
-from booth import (
-    MODEL,
-    SAMPLES,
-    door,
-    in_batches,
-    painted,
-    panel,
-    panel_with_screen,
-    path_of,
-    serpentine,
-    spot,
-)
+import booth
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES, read_effect_file
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.kernel.laws import Ray, in_precision
+from paint_deposition.part.points import SurfacePoints
 from reference import reference_film_um
 
-ALL = [*EFFECTS.values(), read_effect_file(SAMPLES / 'my_effect.py')]
+ALL = [*EFFECTS.values(), read_effect_file(booth.SAMPLES / 'my_effect.py')]
 AMPLITUDES = [(effect, name) for effect in ALL for name in effect.amplitudes()]
 TWO_SIDED = [
     (effect, name)
@@ -50,7 +41,7 @@ def case(effect: type[Effect], *more: str):
 
 
 # Two passes over the panel, the gun opening and closing on it.
-PASSES = path_of(serpentine((0.08, -0.08)))
+PASSES = booth.path_of(booth.serpentine((0.08, -0.08)))
 EFFECT = pytest.mark.parametrize('effect', [case(effect) for effect in ALL])
 AMPLITUDE = pytest.mark.parametrize(('effect', 'name'), [case(*one) for one in AMPLITUDES])
 
@@ -95,16 +86,19 @@ def test_values_outside_the_bounds_are_refused(effect: type[Effect]):
 
 @EFFECT
 def test_neutral_changes_nothing(effect: type[Effect]):
-    points, neutral = door().points(), effect()
+    points, neutral = booth.door().points(), effect()
     film = np.linspace(0.0, 30.0, len(points))
-    context = PathContext(MODEL.projection, points.down, points.outward, points.centre_m)
+    context = PathContext(booth.MODEL.projection, points.down, points.outward, points.centre_m)
     assert np.array_equal(neutral.on_film(film, points), film)
     assert np.array_equal(neutral.on_gauge(film, points), film)
     path = neutral.on_path(PASSES, context)
     for column in fields(PASSES):
         before, after = getattr(PASSES, column.name), getattr(path, column.name)
         np.testing.assert_allclose(after, before, rtol=1e-14, atol=1e-14, err_msg=column.name)
-    film_of, base = painted(door(), PASSES, effect()), painted(door(), PASSES)
+    film_of, base = (
+        booth.painted(booth.door(), PASSES, effect()),
+        booth.painted(booth.door(), PASSES),
+    )
     assert neutral.is_neutral
     assert np.array_equal(film_of.gauge_um, base.gauge_um)
     for law in (effect.flux_factor, effect.pattern_scale):
@@ -118,7 +112,7 @@ def test_neutral_changes_nothing(effect: type[Effect]):
 def test_the_film_is_finite_and_flux_is_never_negative(effect: type[Effect]):
     for end in ('low', 'high'):
         extreme = effect(**{name: at[end] for name, at in effect.parameters().items()})
-        film = painted(door(), PASSES, extreme)
+        film = booth.painted(booth.door(), PASSES, extreme)
         assert np.isfinite(film.gauge_um).all()
         assert film.raw_um.min() >= 0.0
 
@@ -127,11 +121,12 @@ def test_the_film_is_finite_and_flux_is_never_negative(effect: type[Effect]):
 def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str):
     described = effect.parameters()[name]
     neutral, step = described['neutral'], 1e-3 * described['typical']
-    surface = panel_with_screen() if effect.id == 'occlusion' else door()
+    surface = booth.panel_with_screen() if effect.id == 'occlusion' else booth.door()
 
     def slope(before: float, after: float) -> np.ndarray:
         films = [
-            painted(surface, PASSES, effect(**{name: value})).gauge_um for value in (before, after)
+            booth.painted(surface, PASSES, effect(**{name: value})).gauge_um
+            for value in (before, after)
         ]
         return (films[1] - films[0]) / (after - before)
 
@@ -148,9 +143,9 @@ def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str
 
 @pytest.mark.parametrize('effect', [case(effect) for effect in WITH_LAW])
 def test_the_kernel_computes_the_law(effect: type[Effect]):
-    points = door().points().select(slice(None, None, 7))
-    path = path_of(serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))
-    model = MODEL.with_effect(effect.typical())
+    points = booth.door().points().select(slice(None, None, 7))
+    path = booth.path_of(booth.serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))
+    model = booth.MODEL.with_effect(effect.typical())
     integrator = FilmIntegrator(points, model, 'double', parallel=False)
     integrator.add(path)
     expected = reference_film_um(points, path, model)
@@ -172,12 +167,12 @@ def test_the_law_stays_in_single_precision(effect: type[Effect]):
 
 @EFFECT
 def test_a_stream_paints_what_the_recording_does(effect: type[Effect]):
-    trajectory = serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
-    model = MODEL.with_effect(effect.typical())
-    whole = painted(panel(0.3, 0.05), trajectory, effect.typical())
-    part = panel(0.3, 0.05)
+    trajectory = booth.serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
+    model = booth.MODEL.with_effect(effect.typical())
+    whole = booth.painted(booth.panel(0.3, 0.05), trajectory, effect.typical())
+    part = booth.panel(0.3, 0.05)
     live = FilmIntegrator(part.points(), model, 'double', part.occluder, parallel=False)
-    for piece in in_batches(trajectory, 7, model.needs_whole_strokes):
+    for piece in booth.in_batches(trajectory, 7, model.needs_whole_strokes):
         live.add(piece)
     assert np.array_equal(live.gauge_um, whole.gauge_um)
     assert live.emitted_cm3 == pytest.approx(whole.emitted_cm3, rel=1e-12)
@@ -185,12 +180,12 @@ def test_a_stream_paints_what_the_recording_does(effect: type[Effect]):
 
 @EFFECT
 def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect]):
-    sheet = painted(door(), PASSES, effect.typical()).gauge_um
+    sheet = booth.painted(booth.door(), PASSES, effect.typical()).gauge_um
     some = slice(11, None, 97)
     stencil_m = 0.01 if effect.needs_slope else None
-    at = door().at(door().vertices_m[some], door().normals[some], stencil_m)
-    model = MODEL.with_effect(effect.typical())
-    integrator = FilmIntegrator(at, model, 'double', door().occluder, parallel=False)
+    at = booth.door().at(booth.door().vertices_m[some], booth.door().normals[some], stencil_m)
+    model = booth.MODEL.with_effect(effect.typical())
+    integrator = FilmIntegrator(at, model, 'double', booth.door().occluder, parallel=False)
     integrator.add(PASSES)
     readings = integrator.gauge_um[: len(sheet[some])]
     # A stencil sees more than the triangles around a vertex.
@@ -200,11 +195,95 @@ def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect])
 
 @pytest.mark.slow
 def test_laws_multiply():
-    points = door().points().select(slice(None, None, 7))
-    path = path_of(spot(z_m=0.45, standoff_m=0.35))
+    points = booth.door().points().select(slice(None, None, 7))
+    path = booth.path_of(booth.spot(z_m=0.45, standoff_m=0.35))
     chosen = [effect.typical() for effect in WITH_LAW]
-    model = MODEL.model_copy(update={'effects': tuple(chosen)})
+    model = booth.MODEL.model_copy(update={'effects': tuple(chosen)})
     integrator = FilmIntegrator(points, model, 'single', parallel=False)
     integrator.add(path)
     expected = reference_film_um(points, path, model)
     np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=3e-6 * expected.max())
+
+
+X, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+Figure = Callable[[np.ndarray, SurfacePoints], float]
+
+
+def along(axis: np.ndarray) -> Figure:
+    return lambda film_um, points: float(booth.centroid_m(film_um, points) @ axis)
+
+
+def negative(figure: Figure) -> Figure:
+    return lambda film_um, points: -figure(film_um, points)
+
+
+def on_ridges(film_um: np.ndarray, points: SurfacePoints) -> float:
+    return float(film_um[points.curvature_per_m < -1.0].sum())
+
+
+def off_valleys(film_um: np.ndarray, points: SurfacePoints) -> float:
+    return -float(film_um[points.curvature_per_m > 1.0].sum())
+
+
+rightward, leftward, upward, downward = along(X), along(-X), along(UP), along(-UP)
+narrowness, loss = negative(booth.spread_m), negative(booth.volume_cm3)
+FAR, NEAR = booth.spot(standoff_m=0.32), booth.spot(standoff_m=0.2)
+ASIDE = booth.spot(x_m=0.2)
+PASS = booth.serpentine((0.0,), half_width_m=0.4, opens_at_m=0.25)
+CLOSE_PASSES = booth.serpentine((0.1, -0.1), half_width_m=0.4, opens_at_m=0.25)
+ON_DOOR = booth.serpentine((0.2, 0.45), half_width_m=0.7, opens_at_m=0.65)
+
+# What a positive value of each amplitude makes more of, and where.
+EXPECTED = {
+    ('incidence_attraction', 'attraction'): (booth.volume_cm3, booth.panel, NEAR),
+    ('standoff_efficiency', 'exponent'): (loss, booth.panel, FAR),
+    ('pattern_spread', 'exponent'): (booth.spread_m, booth.panel, FAR),
+    ('tcp_standoff', 'offset_z_m'): (narrowness, booth.panel, FAR),
+    ('air_drift', 'shift_down_m'): (downward, booth.panel, FAR),
+    ('air_drift', 'shift_across_m'): (rightward, booth.panel, FAR),
+    ('tcp_offset', 'offset_x_m'): (rightward, booth.panel, FAR),
+    ('tcp_offset', 'offset_y_m'): (downward, booth.panel, FAR),
+    ('tcp_tilt', 'tilt_x_rad'): (upward, booth.panel, FAR),
+    ('tcp_tilt', 'tilt_y_rad'): (rightward, booth.panel, FAR),
+    ('part_misalignment', 'shift_down_m'): (upward, booth.panel, FAR),
+    ('part_misalignment', 'shift_across_m'): (leftward, booth.panel, FAR),
+    ('part_misalignment', 'shift_deep_m'): (booth.spread_m, booth.panel, FAR),
+    ('part_misalignment', 'yaw_rad'): (downward, booth.panel, ASIDE),
+    ('sag', 'run_m'): (downward, booth.panel, NEAR),
+    ('convex_attraction', 'gain'): (on_ridges, booth.door, ON_DOOR),
+    ('faraday_shielding', 'shielding'): (off_valleys, booth.door, ON_DOOR),
+    ('gauge_curvature_bias', 'bias_um'): (on_ridges, booth.door, ON_DOOR),
+    ('edge_build', 'gain'): (booth.volume_cm3, booth.door, ON_DOOR),
+    ('corner_slowdown', 'gain'): (booth.volume_cm3, booth.panel, CLOSE_PASSES),
+    ('trigger_lag', 'rise_s'): (loss, booth.panel, PASS),
+    ('trigger_lag', 'fall_s'): (booth.volume_cm3, booth.panel, PASS),
+    ('flow_drift', 'drift_per_pass'): (downward, booth.panel, CLOSE_PASSES),
+    ('fog_gradient', 'fog_um'): (downward, booth.panel, NEAR),
+    ('overspray_fog', 'fog_um'): (booth.volume_cm3, booth.panel, NEAR),
+    ('gauge_gain', 'gain'): (booth.volume_cm3, booth.panel, NEAR),
+    ('gauge_zero', 'offset_um'): (booth.volume_cm3, booth.panel, NEAR),
+    ('pose_lag', 'lag_s'): (rightward, booth.panel, PASS),
+    ('gun_wake', 'lag_s'): (leftward, booth.panel, PASS),
+    ('occlusion', 'strength'): (loss, booth.panel_with_screen, NEAR),
+}
+
+
+def test_every_amplitude_has_a_sign():
+    assert set(EXPECTED) == {(e.id, name) for e in EFFECTS.values() for name in e.amplitudes()}
+
+
+@pytest.mark.parametrize(('effect_id', 'name'), EXPECTED, ids=['-'.join(key) for key in EXPECTED])
+def test_sign(effect_id: str, name: str):
+    figure, part, motion = EXPECTED[effect_id, name]
+    effect, path = EFFECTS[effect_id], booth.path_of(motion)
+    at = effect.parameters()[name]
+
+    def of(value: float) -> float:
+        film_um = booth.painted(part(), path, effect(**{name: value})).gauge_um
+        return figure(film_um, part().points())
+
+    neutral = of(at['neutral'])
+    visible = 1e-6 * abs(neutral) + 1e-9
+    assert of(at['neutral'] + at['typical']) > neutral + visible
+    if at['low'] < at['neutral']:
+        assert of(at['neutral'] - at['typical']) < neutral - visible

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from numba import njit
 
+import paint_deposition as pd
 from booth import SAMPLES, painted, panel, path_of, serpentine
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, TRIAL_RAY, effect_class, load_effect_file
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
-from paint_deposition.files.model_file import write_model
 from paint_deposition.kernel.laws import Ray, in_precision
 
 SAMPLE = (SAMPLES / 'my_effect.py').read_text()
@@ -147,9 +146,9 @@ def test_a_class_of_a_script_has_no_file_that_a_model_could_name(own, tmp_path):
     spec = importlib.util.spec_from_file_location('script', own())
     script = sys.modules['script'] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
-    model = DepositionModel(effects=(script.WakeLoss(loss_per_m_per_s=0.3),))
+    model = pd.DepositionModel(effects=(script.WakeLoss(loss_per_m_per_s=0.3),))
     with pytest.raises(ModelError, match="effect 'wake_loss' has no file; put WakeLoss in a file"):
-        write_model(tmp_path / 'out.yaml', model)
+        pd.write_model(tmp_path / 'out.yaml', model)
 
 
 # An effect that is edited between runs.

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from paint_deposition.errors import PaintError
-from paint_deposition.files.campaign_file import read_campaign
+import paint_deposition as pd
 
 SAMPLE = 'ros2_ws/src/paint_deposition/samples/measured_door'
 
@@ -47,7 +46,7 @@ def changed_readings(folder: Path, change) -> str:
 
 def test_the_sample_arrives_whole(repository):
     lines = []
-    campaign = read_campaign(repository / SAMPLE / 'campaign.yaml', lines.append)
+    campaign = pd.read_campaign(repository / SAMPLE / 'campaign.yaml', lines.append)
     assert [e.name for e in campaign.experiments] == ['panel', 'door']
     assert lines[0] == 'reading panel'
     door = campaign.experiments[1]
@@ -61,7 +60,7 @@ def test_what_the_file_says_is_taken_over(campaign, folder):
     head = {'part': 'door', 'batch': 4711, 'date': '2026-11-21'}
     top = head | {'target_um': 25, 'tolerance_um': 3.5, 'model': 'start.yaml'}
     off = ['voltage', 'draught']
-    read = read_campaign(campaign(top=top, down=[0, 0, -9.81], name=7, switched_off=off))
+    read = pd.read_campaign(campaign(top=top, down=[0, 0, -9.81], name=7, switched_off=off))
     (one,) = read.experiments
     assert (read.model_file, one.name) == (str(folder / 'start.yaml'), '7')
     assert one.surface.down.tolist() == [0, 0, -1]
@@ -75,7 +74,7 @@ def test_what_the_file_says_is_taken_over(campaign, folder):
 def test_a_trigger_that_is_not_named_is_noted(campaign):
     """Without it the gun would spray on the way between passes, which changes every answer."""
     said = []
-    read_campaign(campaign(), remark=lambda *line: said.append(line))
+    pd.read_campaign(campaign(), remark=lambda *line: said.append(line))
     (note,) = (line for kind, _, line in said if kind == 'note' and 'state_topic' in line)
     assert '/atomizer/state (std_msgs/msg/Bool) is not used' in note
     assert 'add `state_topic: /atomizer/state`' in note
@@ -114,16 +113,16 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
 )
 def test_a_fault_is_refused_in_one_line(campaign, changes, message):
     path = campaign(**changes)
-    with pytest.raises(PaintError, match=message) as refused:
-        read_campaign(path)
+    with pytest.raises(pd.PaintError, match=message) as refused:
+        pd.read_campaign(path)
     assert str(refused.value).startswith(str(path))
     assert '\n' not in str(refused.value)
 
 
 def test_two_experiments_need_two_names(campaign):
     entry = {'name': 'door', 'mesh': 'door.stl', 'trajectory': 'door', 'measurements': 'door.csv'}
-    with pytest.raises(PaintError, match="two experiments are called 'door'; rename one"):
-        read_campaign(campaign(experiments=[entry, entry]))
+    with pytest.raises(pd.PaintError, match="two experiments are called 'door'; rename one"):
+        pd.read_campaign(campaign(experiments=[entry, entry]))
 
 
 @pytest.mark.parametrize(
@@ -140,8 +139,8 @@ def test_a_file_that_is_no_campaign_is_refused(tmp_path, text, message):
     path = tmp_path / 'campaign.yaml'
     if text is not None:
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(PaintError, match=message) as refused:
-        read_campaign(path)
+    with pytest.raises(pd.PaintError, match=message) as refused:
+        pd.read_campaign(path)
     assert '\n' not in str(refused.value)
 
 
@@ -149,7 +148,7 @@ def test_readings_a_few_mm_off_are_moved_and_it_is_said(campaign, folder):
     def off(row):
         return [str(float(v) - 0.004) if k == 'y_m' else v for k, v in row.items()]
 
-    read = read_campaign(campaign(measurements=changed_readings(folder, off)))
+    read = pd.read_campaign(campaign(measurements=changed_readings(folder, off)))
     (line,) = read.understood
     assert line.startswith('door: changed.csv: ')
     assert 'commas, UTF-8; x, y, z in m, thickness in µm; moved onto the surface by' in line
@@ -164,8 +163,8 @@ def test_readings_join_their_listed_points(campaign, folder):
     film = ['Messpunkt;Schichtdicke [µm]']
     film += [f'{r[at["point"]]};{r[at["thickness_um"]].replace(".", ",")}' for r in rows[1:]]
     (folder / 'film.txt').write_bytes('\n'.join(film).encode('cp1252'))
-    read = read_campaign(campaign(measurements='film.txt', points='door.csv'))
-    as_before = read_campaign(campaign()).experiments[0].readings
+    read = pd.read_campaign(campaign(measurements='film.txt', points='door.csv'))
+    as_before = pd.read_campaign(campaign()).experiments[0].readings
     joined = read.experiments[0].readings
     assert joined.thickness_um.tolist() == as_before.thickness_um.tolist()
     assert joined.positions_m.tolist() == as_before.positions_m.tolist()
@@ -177,25 +176,25 @@ def test_teeth_of_a_comb_read_low_and_as_likely_anywhere_in_their_step(campaign,
         return [str(float(v) // 5 * 5) if k == 'thickness_um' else v for k, v in row.items()]
 
     comb = changed_readings(folder, tooth)
-    dry = read_campaign(campaign(measurements=comb)).readings
-    read = read_campaign(campaign(measurements=comb, wet=True, solids=0.4))
+    dry = pd.read_campaign(campaign(measurements=comb)).readings
+    read = pd.read_campaign(campaign(measurements=comb, wet=True, solids=0.4))
     assert read.readings.thickness_um == pytest.approx(0.4 * (dry.thickness_um + 2.5))
     assert read.readings.sigma_um == pytest.approx(0.4 * 5.0 / 12**0.5)
     assert 'a comb in steps of 5 µm, half of which is added' in read.understood[0]
 
 
 def test_an_experiment_has_its_own_target(campaign):
-    read = read_campaign(campaign(top={'target_um': 25, 'tolerance_um': 4}))
+    read = pd.read_campaign(campaign(top={'target_um': 25, 'tolerance_um': 4}))
     assert read.target_of(read.experiments[0]) == (25.0, 4.0)
     top = {'target_um': 25, 'tolerance_um': 4}
-    read = read_campaign(campaign(top=top, target_um=30, tolerance_um=5))
+    read = pd.read_campaign(campaign(top=top, target_um=30, tolerance_um=5))
     assert read.target_of(read.experiments[0]) == (30.0, 5.0)
 
 
 def test_what_an_experiment_says_of_its_motion_holds_for_its_guns(campaign):
     """Not the default of a gun that says nothing."""
     guns = [{'trajectory': 'door'}, {'trajectory': 'door', 'tool_axis': 'z'}]
-    one = read_campaign(campaign(guns=guns, tool_axis='-z')).experiments[0]
+    one = pd.read_campaign(campaign(guns=guns, tool_axis='-z')).experiments[0]
     first, second = np.split(one.path.rotation[:, :, 2], 2)
     assert first == pytest.approx(-second)
 
@@ -205,6 +204,6 @@ def test_normals_pointing_into_the_part_are_refused(campaign, folder):
     inward = [f'{rows[0]},nx,ny,nz', *(f'{row},0,-1,0' for row in rows[1:])]
     (folder / 'inward.csv').write_text('\n'.join(inward) + '\n')
     with pytest.raises(
-        PaintError, match=r'normals point away from the surface.*give outward normals'
+        pd.PaintError, match=r'normals point away from the surface.*give outward normals'
     ):
-        read_campaign(campaign(measurements='inward.csv'))
+        pd.read_campaign(campaign(measurements='inward.csv'))

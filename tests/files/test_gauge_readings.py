@@ -1,24 +1,30 @@
-"""Tables of readings: what is read from them, and one clear line for each fault."""
+"""Readings, zones and brushes in files: what is read, and one clear line for each fault."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+import yaml
 
-from paint_deposition.errors import ReadingsError
+import paint_deposition as pd
+from brushes import SET_POINTS, two_brushes
+from files.recorded import START_NS, Messages, pose_entries, straight_pass, write_bag
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.errors import ModelError, ReadingsError, RecordingError
 from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.files.model_file import read_model, write_model
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.provenance import model_digest
+from paint_deposition.part.surface import turned
 
 HEADER = 'x_m,y_m,z_m,thickness_um'
 
 
 @pytest.fixture
-def table(tmp_path):
+def table(file):
     """`table(line, ...)`: a CSV file of these lines."""
-
-    def write(*lines: str):
-        path = tmp_path / 'door.csv'
-        path.write_text('\n'.join(lines) + '\n')
-        return path
-
-    return write
+    return lambda *lines: file('door.csv', '\n'.join(lines) + '\n')
 
 
 def test_every_column_arrives_where_it_belongs(table):
@@ -56,10 +62,7 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
             r"known as z \(columns: 'x_m', 'y_m', 'thickness_um'\); give it with columns: {z: ",
         ),
         (['x_mm,y_m,z_m,thickness_um', '0,0,0,20'], 'x, y, z are in .* give all in one of m, mm'),
-        (
-            ['x,y,z,DFT', 'ell,ell,ell,um', '0,0,0,20'],
-            "x, y, z are in 'ell'; give all in one",
-        ),
+        (['x,y,z,DFT', 'ell,ell,ell,um', '0,0,0,20'], "x, y, z are in 'ell'; give all in one"),
         (['x_m,y_m,z_m,thickness_m', '0,0,0,1'], 'no column is known as the thick'),
         (['x,y,z,dft_um,film_um', '0,0,0,1,2'], "may be in 'dft_um', 'film_um'; name one"),
         (
@@ -111,3 +114,173 @@ def test_a_file_that_is_no_table_is_refused(tmp_path):
         path.write_bytes(content)
         with pytest.raises(ReadingsError, match=f'cannot be read as {kind}'):
             read_readings(path)
+
+
+BAND = 'target_um: 30, tolerance_um: 5'
+
+
+@pytest.fixture(scope='module')
+def bracket(tmp_path_factory):
+    """A wall 400 mm high with a floor before it, folded by 80 degrees, in mm, in several files."""
+    folder = tmp_path_factory.mktemp('bracket')
+    up, out = [0, 0, 400], [0, -400 * np.cos(np.radians(10)), -400 * np.sin(np.radians(10))]
+    corners = np.array([[0, 0, 0], [400, 0, 0], up, [400, 0, 400], out, [400, *out[1:]]], float)
+    faces = np.array([[0, 1, 3], [0, 3, 2], [4, 5, 1], [4, 1, 0]])
+    trimesh.Trimesh(corners, faces, process=False).export(folder / 'part.stl')
+    trimesh.Trimesh(corners, faces[2:], process=False).export(folder / 'floor.stl')
+    trimesh.Trimesh(corners, faces[2:, ::-1], process=False).export(folder / 'wound_on.stl')
+    lines = [f'v {x} {y} {z}' for x, y, z in corners]
+    for name, own in (('Wall', faces[:2]), ('Floor', faces[2:])):
+        lines += [f'o {name}', *(f'f {a} {b} {c}' for a, b, c in own + 1)]
+    (folder / 'part.obj').write_text('\n'.join(lines))
+    return folder
+
+
+def zones_of(folder, *zones, mesh='part.stl'):
+    path = folder / 'zones.yaml'
+    path.write_text('zones:\n' + ''.join(f'  - {{{zone}}}\n' for zone in zones))
+    return pd.read_zones(path, folder / mesh, 1e-3)
+
+
+@pytest.mark.parametrize(
+    ('place', 'mesh'),
+    [
+        ('faces: [2-3]', 'part.stl'), ('faces: [2, 3]', 'part.stl'), ('body: Floor', 'part.obj'),
+        ('mesh: floor.stl', 'part.stl'), ('mesh: wound_on.stl', 'part.stl'),
+        ('mesh: part.obj, body: Floor', 'part.stl'),
+        ('box: [[-1, -1, -1], [1, 1, 1]], body: Floor', 'part.obj'),
+    ],
+)  # fmt: skip
+def test_a_region_is_the_same_however_it_is_told(bracket, place, mesh):
+    """The crease belongs to both faces of the fold: each side of it to its own."""
+    for surface in (part := pd.read_mesh(bracket / mesh, 1e-3), turned(part)):
+        wanted = np.abs(surface.normals[:, 2]) > 0.5
+        found = zones_of(bracket, f'name: floor, {BAND}, {place}', mesh=mesh).on(surface)
+        np.testing.assert_array_equal(found.number == 0, wanted)
+
+
+def test_the_first_zone_that_holds_a_point_has_it_and_others_none(bracket):
+    surface = pd.read_mesh(bracket / 'part.stl', 1e-3)
+    found = zones_of(
+        bracket, f'name: left, {BAND}, box: [[-1, -1, 0], [0.2, 1, 1]]',
+        'name: wall, target_um: 50, tolerance_um: 9, faces: [0-1]',
+    ).on(surface)  # fmt: skip
+    x, wall = surface.vertices_m[:, 0], np.abs(surface.normals[:, 2]) < 0.5
+    np.testing.assert_array_equal(found.names[wall], np.where(x[wall] <= 0.2, 'left', 'wall'))
+    target, tolerance = found.wanted_um(40.0, 8.0)
+    assert set(zip(found.names, target, tolerance, strict=True)) == {
+        ('left', 30.0, 5.0), ('wall', 50.0, 9.0), ('', 40.0, 8.0),
+    }  # fmt: skip
+    assert np.isnan(found.wanted_um()[0][found.number < 0]).all()
+
+
+@pytest.mark.parametrize(
+    ('zones', 'message'),
+    [
+        (('name: a, target_um: 30',), "zone 1 has no 'tolerance_um'"),
+        ((f'name: a, {BAND}',), 'no place; give box, body, faces or mesh'),
+        (('name: a, target_um: 5, tolerance_um: 5, faces: [0]',), 'give a smaller one'),
+        ((f'name: a, {BAND}, faces: [0-x]',), "'0-x' is no number and no range"),
+        ((f'name: a, {BAND}, faces: [3-1]',), 'swap the two'),
+        ((f'name: a, {BAND}, faces: [0-4]',), 'no triangle 4, its last is 3'),
+        ((f'name: a, {BAND}, body: Flour',), "zone 'a'.*no body 'Flour'"),
+        ((f'name: a, {BAND}, box: [[1, 0, 0], [0, 1, 1]]',), 'lowest corner first'),
+        ((f'name: a, {BAND}, mesh_scale: 1, faces: [0]',), 'mesh_scale has no mesh'),
+        ((f'name: a, {BAND}, faces: [0]',) * 2, "two zones are called 'a'"),
+        ((f'name: a, {BAND}, box: [[5, 5, 5], [6, 6, 6]]',),
+         r"zone 'a' holds no vertex of the part.* x 5.000 to 6.000, .* m, the part within"),
+        ((f'name: a, {BAND}, mesh: part.stl', f'name: b, {BAND}, faces: [0]'),
+         r'belong to zones before it \(a\); put it before them'),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named_with_the_remedy(bracket, zones, message):
+    with pytest.raises(pd.PaintError, match=message):
+        zones_of(bracket, *zones).on(pd.read_mesh(bracket / 'part.stl', 1e-3))
+
+
+@pytest.mark.parametrize('text', ['', 'zones: []', 'zones: {a: 1}', 'zone: [{name: a}]'])
+def test_a_file_without_zones_is_refused(tmp_path, text):
+    (tmp_path / 'zones.yaml').write_text(text)
+    with pytest.raises(pd.PaintError, match='zones'):
+        pd.read_zones(tmp_path / 'zones.yaml', tmp_path / 'part.stl')
+
+
+MODEL = two_brushes(effects=(EFFECTS['edge_build'].typical(),))
+HEAD = 'x_m,y_m,z_m,qx,qy,qz,qw'
+POSE = '0,0,0,1,0,0,0'
+
+
+def test_brushes_are_written_and_read_back_without_loss(tmp_path: Path):
+    path = tmp_path / 'model.yaml'
+    write_model(path, MODEL)
+    assert read_model(path) == MODEL
+    content = yaml.safe_load(path.read_text())
+    assert 'planar' not in content
+    assert content['brushes'] == {
+        brush.number: {'planar': brush.planar.model_dump(), **SET_POINTS[brush.number]}
+        for brush in MODEL.brushes
+    }
+    assert all('#' in line for line in path.read_text().splitlines() if ': ' in line)
+    other = MODEL.of_brushes(
+        [*MODEL.brushes[:1], MODEL.brushes[1].model_copy(update={'solids': 0.5})],
+        effects=MODEL.effects,
+    )
+    assert model_digest(other) != model_digest(MODEL) == model_digest(read_model(path))
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('brushes: {}', 'brushes is empty; give a brush by its number, or planar'),
+        ('brushes: {0: {planar: {}}}', 'brushes: 0 is not a brush number; give 1, 2 and so on'),
+        ('brushes: {1: 3}', 'brushes, 1 is 3; expected the keys '),
+        ('brushes: {1: {planer: {}}}', "brushes, 1: unknown key 'planer'; did you mean 'planar'?"),
+        ('brushes: {1: {planar: {}, solids: 45}}', 'brushes, 1: solids is 45; expected a number'),
+        ('brushes: {1: {planar: {K2: 2}}}', 'brushes, 1: planar: K2 is 2; expected a number 0 '),
+        ('brushes: {1: {solids: 0.4}}', 'brushes, 1: planar is missing; calibrate the brush, or'),
+        ('planar: {}\nbrushes: {1: {planar: {}}}', 'planar and brushes are both given; keep one'),
+    ],
+)
+def test_what_is_no_brush_is_refused_in_one_line(tmp_path: Path, text, message):
+    path = tmp_path / 'model.yaml'
+    path.write_text(text)
+    with pytest.raises(ModelError) as refused:
+        read_model(path)
+    assert str(refused.value).startswith(f'{path}: {message}')
+
+
+def test_a_table_of_poses_names_the_brush_from_its_row_on(tmp_path: Path):
+    path = tmp_path / 'poses.csv'
+    path.write_text(
+        f't,{HEAD},gun,brush\n0,{POSE},1,2\n0.1,{POSE},1,3\n0.2,{POSE},0,0\n0.3,{POSE},1,2\n'
+    )
+    read = read_recording(path)
+    assert read.trigger_flow.tolist() == [1.0, 1.0, 0.0, 1.0]
+    assert read.trigger_brush.tolist() == [2, 3, 0, 2]
+    assert 'gun by gun, brush by brush' in read.notes[0]
+    # Without a trigger the gun sprays throughout, with these brushes.
+    path.write_text(f't,{HEAD},brush\n0,{POSE},2\n0.1,{POSE},3\n')
+    assert [(flow, brush) for _, flow, brush in read_recording(path).triggers] == [(1, 2), (1, 3)]
+    path.write_text(f't,{HEAD},brush\n0,{POSE},2\n0.1,{POSE},2.5\n')
+    with pytest.raises(RecordingError, match=r'line 3: brush is 2\.5; give the number of a brush'):
+        read_recording(path)
+
+
+def test_a_programmed_table_takes_the_brush_of_each_move(tmp_path: Path):
+    path = tmp_path / 'passes.csv'
+    path.write_text(
+        f'{HEAD},speed_m_per_s,spraying,brush\n'
+        '0,0,0,1,0,0,0,1,0,0\n0.5,0,0,1,0,0,0,1,1,4\n1,0,0,1,0,0,0,1,1,9\n2,0,0,1,0,0,0,1,0,9\n'
+    )
+    assert read_recording(path).triggers == [
+        (0, 1.0, 4), (500_000_000, 1.0, 9), (1_000_000_000, 0.0, 9)
+    ]  # fmt: skip
+
+
+def test_states_recorded_before_they_had_a_brush_are_of_the_only_one(tmp_path: Path):
+    messages = Messages()
+    assert 'brush' not in messages.store.fielddefs['paint_msgs/msg/AtomizerState'][1]
+    entries = pose_entries(straight_pass(triggers=False))
+    entries.insert(1, ('/state', START_NS + 1, messages.state(START_NS, True, 0.8)))
+    bag = write_bag(tmp_path / 'old', entries)
+    assert read_recording(bag, None, '/state').triggers == [(START_NS, 0.8, 0)]

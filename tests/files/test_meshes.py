@@ -2,6 +2,7 @@
 
 import importlib.util
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,6 @@ import trimesh
 from trimesh.creation import box, icosphere
 from trimesh.transformations import translation_matrix
 
-from files.step_panels import step_panels
 from paint_deposition.errors import MeshError
 from paint_deposition.files import meshes
 from paint_deposition.files.meshes import read_mesh, write_mesh_ply
@@ -160,6 +160,8 @@ def test_the_painted_mesh_carries_the_film(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ['film.ply', 'part.stl']
 
 
+# Upright panels that face -y, as CAD programs export them (AP203).
+PARTS = Path(__file__).with_name('parts')
 DOOR_M, FLANGE_M = (1.2, 0.04, 0.8), (1.2, 0.1, 0.02)
 needs_step = pytest.mark.skipif(
     importlib.util.find_spec('cascadio') is None, reason='STEP is read by cascadio'
@@ -241,29 +243,23 @@ def test_objects_of_an_obj_and_solids_of_a_text_stl_have_names(tmp_path):
 
 
 @needs_step
-@pytest.mark.parametrize(
-    ('unit', 'per_metre'), [('.MILLI.', 1e3), ('$', 1.0)], ids=['mm', 'metres']
-)
-def test_step_is_read_in_its_own_unit(tmp_path, unit, per_metre):
-    path = tmp_path / 'door.step'
-    path.write_text(step_panels(1.2 * per_metre, 0.8 * per_metre, unit))
-    surface = read_mesh(path, max_edge_length_m=0.2)
+@pytest.mark.parametrize('name', ['door_mm.step', 'door_m.step'])
+def test_step_is_read_in_its_own_unit(name):
+    surface = read_mesh(PARTS / name, max_edge_length_m=0.2)
     assert box_m(surface) == [[0.0, 0.0, 0.0], [1.2, 0.0, 0.8]]
     assert surface.area_m2 == pytest.approx(0.96, rel=1e-6)
-    assert surface.notes == ('door.step: STEP, its unit converted to metres',)
+    assert surface.notes == (f'{name}: STEP, its unit converted to metres',)
 
 
 @needs_step
-def test_a_part_of_a_step_file_is_taken_by_its_name(tmp_path):
-    path = tmp_path / 'doors.stp'
-    path.write_text(step_panels(1200.0, 800.0, names=('left', 'right')))
+def test_a_part_of_a_step_file_is_taken_by_its_name():
+    path = PARTS / 'doors.stp'
     assert '2 bodies' in read_mesh(path, max_edge_length_m=0.2).notes[1]
     right = read_mesh(path, max_edge_length_m=0.2, body='right')
     assert box_m(right) == [[1.8, 0.0, 0.0], [3.0, 0.0, 0.8]]
 
 
-def test_without_its_reader_step_is_refused_with_what_to_install(tmp_path, monkeypatch):
-    (tmp_path / 'door.step').write_text(step_panels(1.0, 1.0))
+def test_without_its_reader_step_is_refused_with_what_to_install(monkeypatch):
     monkeypatch.setattr(meshes, 'STEP_READER', 'a_reader_that_is_not_there')
     with pytest.raises(MeshError, match='run: pip install a_reader_that_is_not_there, or export'):
-        read_mesh(tmp_path / 'door.step')
+        read_mesh(PARTS / 'door_mm.step')

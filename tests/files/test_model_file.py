@@ -1,5 +1,7 @@
-"""Model files: what is written reads back exactly, what is wrong is said in one line."""
+"""Model files and written files: read back exactly, whole or not at all."""
 
+import os
+import stat
 from pathlib import Path
 
 import numpy as np
@@ -13,21 +15,10 @@ from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, L
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError
+from paint_deposition.files.atomic import write_text
 from paint_deposition.files.model_file import read_model, read_model_file, write_model
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.eq1_pattern import PATTERN, PlanarPattern
-
-
-@pytest.fixture
-def written(tmp_path: Path):
-    """Writes a model file of this text."""
-
-    def write(text: str) -> Path:
-        path = tmp_path / 'model.yaml'
-        path.write_text(text, encoding='utf-8')
-        return path
-
-    return write
 
 
 def refusal(path: Path) -> str:
@@ -149,17 +140,17 @@ MAP = 'covariate: place, maps: [{part_m: [1, 1, 1], high_m: [0.5, 0.5], rows: 2'
         ('covariate: footprint, reach_m: 0', 'reach_m is 0; expected a number above 0'),
     ],
 )
-def test_what_is_no_learned_law_is_said_in_one_line(written, entry: str, message: str):
-    assert message in refusal(written(f'effects: [{{id: learned, {entry}}}]'))
+def test_what_is_no_learned_law_is_said_in_one_line(file, entry: str, message: str):
+    assert message in refusal(file('model.yaml', f'effects: [{{id: learned, {entry}}}]'))
 
 
-def test_what_is_left_out_has_its_default(written):
-    assert read_model(written('planar: {K2: 0.3}')) == DepositionModel(
+def test_what_is_left_out_has_its_default(file):
+    assert read_model(file('model.yaml', 'planar: {K2: 0.3}')) == DepositionModel(
         planar=PlanarPattern(K2=0.3)
     )
-    assert read_model(written('effects:')).effects == ()
-    assert read_model(written('planar: {K2: 1e-2}')).planar.K2 == 0.01
-    assert read_model(written('effects: [{id: air_drift}]')).effects[0].is_neutral
+    assert read_model(file('model.yaml', 'effects:')).effects == ()
+    assert read_model(file('model.yaml', 'planar: {K2: 1e-2}')).planar.K2 == 0.01
+    assert read_model(file('model.yaml', 'effects: [{id: air_drift}]')).effects[0].is_neutral
 
 
 @pytest.mark.parametrize(
@@ -191,8 +182,8 @@ def test_what_is_left_out_has_its_default(written):
         ('planar:\n  K2: [', 'cannot be read as YAML (line 2: '),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_in_one_line(written, text: str, message: str):
-    assert message in refusal(written(text))
+def test_what_is_wrong_is_said_in_one_line(file, text: str, message: str):
+    assert message in refusal(file('model.yaml', text))
 
 
 def test_a_missing_or_unreadable_file_is_named(tmp_path: Path):
@@ -276,3 +267,15 @@ def test_what_is_wrong_with_a_posterior_is_said_in_one_line(
     message = refusal(with_posterior)
     assert message.startswith(f'{with_posterior}: posterior')
     assert words in message
+
+
+def test_files_have_the_rights_of_the_process_and_its_umask_is_never_changed(
+    tmp_path: Path, monkeypatch
+):
+    before = os.umask(0o027)
+    # The mask belongs to the process: two threads that set it and put it back can leave it at 0.
+    monkeypatch.setattr(os, 'umask', lambda mask: pytest.fail('the umask was changed'))
+    write_text(tmp_path / 'film.csv', 'x_m,y_m')
+    monkeypatch.undo()
+    assert stat.S_IMODE((tmp_path / 'film.csv').stat().st_mode) == 0o640
+    assert os.umask(before) == 0o027

@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 from trimesh.creation import box
 
+import paint_deposition as pd
 from booth import MODEL, path_of, serpentine
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.spray_geometry import facet_error, facet_errors_um
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
 from surfaces import triangulated
 
 PATH = path_of(serpentine((0.3, 0.1, -0.1, -0.3), half_width_m=0.7, opens_at_m=0.65))
-BELL = DepositionModel()
+BELL = pd.DepositionModel()
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ def cap(radius_m: float) -> Curve:
 def told_and_true(curve: Curve, edge_m: float, jitter: float) -> tuple[float, float]:
     """The error told, and the worst one over the refined mesh, as shares of the peak."""
     vertices, faces = triangulated(curve.depth, edge_m, 0.12, jitter=jitter)
-    surface = Surface.from_triangles(vertices, faces, min(0.01, edge_m / 2.0))
+    surface = pd.Surface.from_triangles(vertices, faces, min(0.01, edge_m / 2.0))
     exact_m, normals = curve.nearest(surface.vertices_m)
     films = []
     for points in (surface.points(), SurfacePoints(exact_m, normals)):
@@ -95,10 +94,10 @@ def test_the_error_is_told_within_a_third(curve, edge_m, jitter):
 
 def test_flat_and_sharp_parts_cost_nothing():
     vertices, faces = triangulated(lambda x, z: 0.3 * x, 0.1)
-    flat = Surface.from_triangles(vertices, faces, 0.02)
+    flat = pd.Surface.from_triangles(vertices, faces, 0.02)
     body = box((0.4, 0.3, 0.3))
-    sharp = Surface.from_triangles(body.vertices, np.asarray(body.faces), 0.02)
-    bent = Surface.from_triangles(*triangulated(lambda x, z: 0.7 * np.abs(z), 0.1), 0.02)
+    sharp = pd.Surface.from_triangles(body.vertices, np.asarray(body.faces), 0.02)
+    bent = pd.Surface.from_triangles(*triangulated(lambda x, z: 0.7 * np.abs(z), 0.1), 0.02)
     for surface in (flat, sharp, bent):
         assert facet_error(surface, PATH, MODEL) == (0.0, '')
 
@@ -106,18 +105,18 @@ def test_flat_and_sharp_parts_cost_nothing():
 def test_the_warning_names_the_place_and_a_length_that_helps():
     curve = round_fold(0.08, 45.0)
     vertices, faces = triangulated(curve.depth, 0.024, 0.12)
-    share, warning = facet_error(Surface.from_triangles(vertices, faces, 0.01), PATH, BELL)
+    share, warning = facet_error(pd.Surface.from_triangles(vertices, faces, 0.01), PATH, BELL)
     assert share > 0.02
     assert abs(float(warning.split(') m')[0].split(', ')[-1])) < 0.08
     wanted_m = 1e-3 * float(warning.split('edges of about ')[1].split(' mm')[0])
     vertices, faces = triangulated(curve.depth, wanted_m, 0.12)
-    finer, _ = facet_error(Surface.from_triangles(vertices, faces, 0.01), PATH, BELL)
+    finer, _ = facet_error(pd.Surface.from_triangles(vertices, faces, 0.01), PATH, BELL)
     assert finer < 0.5 * share
 
 
 @pytest.mark.parametrize('curve', [round_fold(0.15, 40.0), cap(0.5)])
 def test_the_error_at_readings_is_most_of_the_true_one(curve):
-    surface = Surface.from_triangles(*triangulated(curve.depth, 0.02, 0.2, jitter=0.2), 0.01)
+    surface = pd.Surface.from_triangles(*triangulated(curve.depth, 0.02, 0.2, jitter=0.2), 0.01)
     at = np.random.default_rng(0).choice(len(surface.vertices_m), 200, replace=False)
     points = SurfacePoints(surface.vertices_m[at], surface.normals[at])
     told_um = facet_errors_um(surface, points, PATH, BELL)

@@ -1,18 +1,27 @@
-"""The integral: the film does not depend on how the path was sampled, cut or placed."""
+"""The integral: what it does not depend on, its terms, and shadows on it."""
+
+import math
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from trimesh.creation import box
+from trimesh.util import concatenate
 
+import paint_deposition as pd
 import scenes
+from booth import LOOKING_ALONG_Y
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.occlusion import Occlusion
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.layout import SIGHT_STEP_M, emission_points_m, term_weights
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from scenes import lying_plane, stamps_ns, straight_pass, weaving
 
-MODEL = DepositionModel()
+MODEL = pd.DepositionModel()
 
 
 def painted(points, motion, model=MODEL, precision='double'):
@@ -42,7 +51,7 @@ def sampled_unevenly():
     positions, quaternions = log.positions_m.copy(), log.quaternions_xyzw.copy()
     positions[again], quaternions[again] = positions[again - 1], quaternions[again - 1]
     assert len(again) > 5
-    return Trajectory(log.stamps_ns, positions, quaternions)
+    return pd.Trajectory(log.stamps_ns, positions, quaternions)
 
 
 @pytest.fixture(scope='module')
@@ -76,7 +85,7 @@ def test_the_film_does_not_depend_on_the_sampling(trajectory, limit, precision, 
 @pytest.mark.parametrize('standoff_m', [0.25, 0.4])
 def test_sub_steps_are_fine_enough(planar, standoff_m):
     """One segment of a whole pass with the gun opening and closing on it, cut by itself."""
-    model = DepositionModel(planar=planar)
+    model = pd.DepositionModel(planar=planar)
     trigger = {
         'trigger_stamps_ns': stamps_ns([0.0, 0.6101, 1.4]),
         'trigger_flow': np.array([0.0, 1.0, 0.0]),
@@ -96,7 +105,7 @@ def test_the_film_is_in_proportion_to_flow_k1_and_time():
     plain = painted(points, path).film_um
     less = painted(points, path.with_(flow=0.37 * path.flow)).film_um
     assert largest_error(less, 0.37 * plain) < 1e-12
-    more = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=3 * MODEL.planar.K1_cm3_per_s))
+    more = pd.DepositionModel(planar=PlanarPattern(K1_cm3_per_s=3 * MODEL.planar.K1_cm3_per_s))
     assert largest_error(painted(points, path, more).film_um, 3.0 * plain) < 1e-12
     slow = painted(points, straight_pass(np.linspace(0.0, 4.0, 401))).film_um
     fast = painted(points, straight_pass(np.linspace(0.0, 2.0, 401))).film_um
@@ -108,7 +117,7 @@ def test_moving_part_and_gun_together_changes_nothing():
     log = weaving(np.arange(0.0, 2.0, 0.02))
     turn, shift = Rotation.from_euler('xyz', [0.5, -1.2, 2.8]), np.array([4.0, -3.0, 1.5])
     moved = SurfacePoints(turn.apply(points.positions_m) + shift, turn.apply(points.normals))
-    moved_log = Trajectory(
+    moved_log = pd.Trajectory(
         log.stamps_ns,
         turn.apply(log.positions_m) + shift,
         (turn * Rotation.from_quat(log.quaternions_xyzw)).as_quat(),
@@ -117,3 +126,144 @@ def test_moving_part_and_gun_together_changes_nothing():
     assert largest_error(painted(moved, moved_log).film_um, still) < 1e-9
     single = painted(moved, moved_log, precision='single').film_um
     assert largest_error(single, still) < 2e-6
+
+
+PATTERNS = {
+    'default': PlanarPattern(),
+    'ring only': PlanarPattern(K2=0.0, K3=0.9),
+    'centre only': PlanarPattern(K2=1.0),
+    'spot': PlanarPattern(r_m=0.0, K2=0.5, sigma1_m=0.03, sigma2_m=0.02),
+    'thin ring': PlanarPattern(r_m=0.3, sigma1_m=0.02, K3=0.5, phi_rad=-2.0),
+}
+CASES = [*((planar, ()) for planar in PATTERNS.values()), (PlanarPattern(), ('pattern_spread',))]
+# Of the film's peak: what lies beyond the reach of one or the other.
+CUT = 3e-6
+
+
+def model_of(planar: PlanarPattern, effects: tuple[str, ...]) -> DepositionModel:
+    return DepositionModel(
+        planar=planar, effects=tuple(EFFECTS[name].typical() for name in effects)
+    )
+
+
+def film_um(model: DepositionModel) -> np.ndarray:
+    integrator = FilmIntegrator(lying_plane(count=13), model, 'double', parallel=False)
+    integrator.add(PATH)
+    return integrator.raw_um
+
+
+def terms_um(model: DepositionModel) -> np.ndarray:
+    integrator = FilmIntegrator(lying_plane(count=13), model, 'double', parallel=False)
+    return integrator.terms(integrator.steps(PATH))
+
+
+PATH = spray_path(weaving(np.arange(0.0, 2.0, 0.05)))[0]
+
+
+def moved(p: PlanarPattern, parameter: int, step: float) -> PlanarPattern:
+    """The pattern with one of the parameters of ``term_weights`` moved."""
+    lopsided = [p.K3 * math.cos(p.phi_rad), p.K3 * math.sin(p.phi_rad)]
+    if parameter in (2, 3):
+        lopsided[parameter - 2] += step
+    factors = {
+        0: ('K1_cm3_per_s', p.K1_cm3_per_s * math.exp(step)), 1: ('K2', p.K2 + step),
+        4: ('r_m', p.r_m + step), 5: ('sigma1_m', p.sigma1_m * math.exp(step)),
+        6: ('sigma2_m', p.sigma2_m * math.exp(step)),
+    }  # fmt: skip
+    change = dict([factors[parameter]]) if parameter in factors else {}
+    asymmetry = {'K3': math.hypot(*lopsided), 'phi_rad': math.atan2(*lopsided[::-1])}
+    return p.model_copy(update={**asymmetry, **change})
+
+
+@pytest.mark.parametrize(('planar', 'effects'), CASES, ids=[*PATTERNS, 'pattern spread'])
+def test_the_terms_add_up_to_the_film_and_to_its_derivatives(planar, effects):
+    model = model_of(planar, effects)
+    of_film, weights = term_weights(planar)
+    terms, film = terms_um(model), film_um(model)
+    peak = film.max()
+    assert peak > 1.0
+    assert of_film @ terms == pytest.approx(film, rel=0, abs=CUT * peak)
+    found = weights @ terms
+    for parameter, derivative in enumerate(found):
+        if parameter == 1 and planar.K2 in (0.0, 1.0):
+            continue  # see the test below
+        ends = [
+            film_um(model.model_copy(update={'planar': moved(planar, parameter, step)}))
+            for step in (-1e-4, 1e-4)
+        ]
+        slope = (ends[1] - ends[0]) / 2e-4
+        scale = max(np.abs(slope).max(), peak)
+        assert derivative == pytest.approx(slope, rel=0, abs=1e-4 * scale), parameter
+
+
+OPEN = pd.DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.3, r_m=0.05, sigma1_m=0.03))
+SHADED = OPEN.with_effect(Occlusion(strength=0.8))
+
+
+@pytest.fixture(scope='module')
+def tray():
+    """A box open to the gun, with a bar across it."""
+    walls = [
+        box((0.8, 0.01, 0.5)),
+        *(box((0.8, 0.12, 0.01), transform=shifted(0.0, -0.06, z)) for z in (-0.25, 0.25)),
+        *(box((0.01, 0.12, 0.5), transform=shifted(x, -0.06, 0.0)) for x in (-0.4, 0.4)),
+        box((0.03, 0.03, 0.5), transform=shifted(0.05, -0.1, 0.0)),
+    ]
+    whole = concatenate(walls)
+    return pd.Surface.from_triangles(whole.vertices, np.asarray(whole.faces), 0.03)
+
+
+@pytest.fixture(scope='module')
+def path():
+    log = straight_pass(
+        np.linspace(0, 1.5, 76), (-0.5, -0.3, 0.1), (0.5, -0.25, -0.1), LOOKING_ALONG_Y
+    )
+    return spray_path(log, max_step_m=OPEN.max_step_m)[0]
+
+
+def shifted(x, y, z):
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+def traced_everywhere(surface, path):
+    """The film sub-step by sub-step, all points traced, and how much the shadows take."""
+    origins = emission_points_m(SHADED, path)
+    film, open_film, eye = 0.0, 0.0, np.full(3, np.inf)
+    step = FilmIntegrator(surface.points(), OPEN, 'double')
+    for row, origin in enumerate(origins):
+        if np.linalg.norm(origin - eye) > SIGHT_STEP_M:
+            eye = origin
+            seen = surface.occluder.sees(eye, surface.vertices_m)
+        step.reset()
+        step.add(path.select(slice(row, row + 1)))
+        film, open_film = film + step.film_um * (1.0 - 0.8 * ~seen), open_film + step.film_um
+    return film, 1.0 - film.sum() / open_film.sum()
+
+
+@pytest.fixture(scope='module')
+def expected(tray, path):
+    film, lost = traced_everywhere(tray, path)
+    assert 0.05 < lost < 0.5
+    return film
+
+
+@pytest.mark.parametrize('at_once', [10_000, 7])
+def test_the_film_is_that_of_all_points_traced(tray, path, expected, at_once):
+    film = FilmIntegrator(tray.points(), SHADED, 'double', tray.occluder)
+    for start in range(0, len(path), at_once):
+        film.add(path.select(slice(start, start + at_once)))
+    # Beyond the pattern's reach, where the flux is a millionth of the peak, nothing is traced.
+    assert np.abs(film.film_um - expected).max() < 1e-6 * expected.max()
+
+
+def test_a_prepared_path_serves_a_wider_pattern(tray, path):
+    wide = SHADED.model_copy(update={'planar': PlanarPattern(r_m=0.2, sigma1_m=0.09)})
+    prepared = FilmIntegrator(tray.points(), SHADED, 'double', tray.occluder)
+    steps = prepared.steps(path)
+    prepared.use(wide)
+    prepared.paint(steps)
+    film = FilmIntegrator(tray.points(), wide, 'double', tray.occluder)
+    film.add(path)
+    assert np.abs(prepared.film_um - film.film_um).max() < 1e-5 * film.film_um.max()

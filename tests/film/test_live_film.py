@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from brushes import two_brushes
 from paint_deposition.effects.catalogue import effect_class
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.pose_stream import TriggerChange
 from scenes import (
     START_NS,
     changes_of,
@@ -24,7 +23,7 @@ from scenes import (
     weaving,
 )
 
-MODEL = DepositionModel()
+MODEL = pd.DepositionModel()
 # Its film at a place depends on what lies ahead in the stroke.
 LAGGING = MODEL.with_effect(effect_class('corner_slowdown').typical())
 TIMES_S = np.arange(0.0, 4.0, 0.004)
@@ -89,32 +88,6 @@ def test_changes_that_come_out_of_order_leave_the_newest_in_force():
     assert film.flow == 0.7
 
 
-def test_after_a_reset_the_gun_stays_as_it_was():
-    motion = straight_pass(TIMES_S, **TRIGGERS)
-    film = LiveFilm(lying_plane(), MODEL)
-    coming = events(motion, 10)
-    half = len(coming) // 2
-    film.replay(coming[:half])
-    assert film.flow == 0.0
-    film.reset()
-    assert film.snapshot().film_um.max() == 0.0
-    assert film.counts.received == 0
-    assert film.flow == 0.0
-    film.replay(coming[half:])
-    # The gun is off from 1.75 s to 2.2 s, so the reset between cuts nothing.
-    rest = PoseBatch.joined([event for event in coming[half:] if isinstance(event, PoseBatch)])
-    second = Trajectory(
-        rest.stamps_ns,
-        rest.positions_m,
-        rest.quaternions_xyzw,
-        trigger_stamps_ns=stamps_ns([2.2]),
-        trigger_flow=np.array([0.8]),
-    )
-    assert np.allclose(
-        film.snapshot().film_um, painted(lying_plane(), second).film_um, rtol=0, atol=1e-9
-    )
-
-
 def test_states_after_a_clock_was_set_back_count_though_the_film_is_reset_before_their_poses():
     """All of them, also one that comes with poses that may yet be stragglers."""
     motion = straight_pass(TIMES_S)
@@ -149,17 +122,6 @@ def test_a_state_that_is_told_ahead_holds_though_the_film_is_reset_before_its_po
         quaternions_xyzw=motion.quaternions_xyzw[before:],
     )  # fmt: skip
     assert np.array_equal(film.snapshot().film_um, painted(lying_plane(), rest).film_um)
-
-
-def test_a_motion_that_begins_again_paints_a_second_coat():
-    motion = straight_pass(TIMES_S, **TRIGGERS)
-    film = LiveFilm(lying_plane(), MODEL)
-    for _ in range(2):
-        film.replay(events(motion, 10))
-    once = painted(lying_plane(), motion).film_um
-    assert np.allclose(film.snapshot().film_um, 2 * once, rtol=0, atol=1e-5 * once.max())
-    assert film.counts.restarts == 1
-    assert film.counts.late_triggers == 0
 
 
 def test_the_log_paints_the_motion_again_with_another_model():
@@ -262,7 +224,7 @@ def test_a_clock_that_is_set_back_within_a_part_gives_the_offline_film(batch, ba
     states = [(0, 0.0), (100, 1.0), *([(half, 0.5)] if switched else []), (half + 150, 0.0),
               (half + 220, 1.0)]  # fmt: skip
     rows = np.array([row for row, _ in states])
-    recorded = Trajectory(
+    recorded = pd.Trajectory(
         stamps, motion.positions_m, motion.quaternions_xyzw, trigger_stamps_ns=stamps[rows],
         trigger_flow=np.array([flow for _, flow in states]), trigger_rows=rows,
     )  # fmt: skip

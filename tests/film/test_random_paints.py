@@ -11,13 +11,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+import paint_deposition as pd
 from paint_deposition.effects.catalogue import effect_class
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.pose_stream import TriggerChange
-from paint_deposition.motion.trajectory import Trajectory
 from scenes import LOOKING_DOWN, lying_plane, painted, poses, stamps_ns
 
 EXAMPLES = int(os.environ.get('PAINT_EXAMPLES', '10'))
@@ -31,7 +30,7 @@ PLANE = lying_plane(0.7, 72)
 
 
 @st.composite
-def models(draw) -> DepositionModel:
+def models(draw) -> pd.DepositionModel:
     """A narrow pattern, so that all of it meets the part, and the laws of one of LAWS.
 
     Eq. (1) has no one value at the centre of an uneven ring. The ring is hollow here, so that a
@@ -46,11 +45,11 @@ def models(draw) -> DepositionModel:
     plane = draw(st.floats(0.2, 0.4))
     projection = Projection(model_plane_m=plane, emission_offset_m=draw(st.floats(0.0, 0.1)))
     laws = [effect_class(name).typical() for name in draw(st.sampled_from(LAWS))]
-    return DepositionModel(planar=planar, projection=projection, effects=tuple(laws))
+    return pd.DepositionModel(planar=planar, projection=projection, effects=tuple(laws))
 
 
 @st.composite
-def motions(draw) -> Trajectory:
+def motions(draw) -> pd.Trajectory:
     """Straight legs between random corners at a random rate, with a random trigger or none."""
     corners = np.array(draw(st.lists(
         st.tuples(*[st.floats(-0.2, 0.2)] * 2, st.floats(0.2, 0.3)), min_size=2, max_size=4,
@@ -64,7 +63,7 @@ def motions(draw) -> Trajectory:
     flow = draw(st.lists(
         st.sampled_from([0.0, 0.5, 1.0]), min_size=len(switched_s), max_size=len(switched_s),
     ))  # fmt: skip
-    return Trajectory(
+    return pd.Trajectory(
         stamps_ns(times_s), positions, np.tile(quaternion, (len(times_s), 1)), 'part',
         stamps_ns(switched_s), np.array(flow, dtype=float),
     )  # fmt: skip

@@ -12,22 +12,20 @@ from pathlib import Path
 import trimesh
 from mcap.writer import CompressionType, Writer
 
+import paint_deposition as pd
 from booth import SAMPLES
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
-from files.tables.test_gauge_layouts import ELCOMETER, FISCHER, POSITECTOR, ROBOT
+from files.tables.test_gauge_layouts import LAYOUTS
 from paint_deposition.batch.sweep_file import read_sweep
-from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings
-from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.gauge_readings import MeasuringPoints, read_points
 from paint_deposition.files.model_file import read_model_file
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.provenance import planned_model
+from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.files.recordings.pose_topics import summarise
+from paint_deposition.files.recordings.pose_topics import sources_of_poses
 from paint_deposition.files.tables.reading_columns import Layout
-from paint_deposition.files.zones_file import read_zones
-from robot_arm import urdf
+from robot_arm import URDF
 from workbook import write_workbook
 
 GAUGE_JSON = (
@@ -110,7 +108,7 @@ class Target:
 
 def _mesh(path: Path) -> object:
     # Fine enough for a small part, and no work worth speaking of for the largest that is taken.
-    return read_mesh(path, max_edge_length_m=5.0)
+    return pd.read_mesh(path, max_edge_length_m=5.0)
 
 
 def _box(kind: str, scale: float = 1.0, **options: str) -> bytes:
@@ -183,9 +181,10 @@ def _mcap() -> bytes:
 
 
 def _bag(path: Path) -> object:
-    summarise(path, 0.25)
+    with open_bag(path) as bag:
+        list(sources_of_poses(bag, 0.25))
     state = None if path.suffix == '.bag' else '/atomizer/state'
-    return read_recording(path, pose_topic='/atomizer/pose', state_topic=state)
+    return pd.read_recording(path, pose_topic='/atomizer/pose', state_topic=state)
 
 
 def _recovered(path: Path) -> object:
@@ -211,28 +210,28 @@ def targets() -> dict[str, Target]:
     book = _written(lambda path: write_workbook(path, {'Readings': rows}), 'book.xlsx')
     in_mm = _box('3mf', 1000.0)
     ros1 = _written(lambda path: write_bag(path, _entries(True), 'ros1'), 'run.bag')
-    readings = [text.encode() for text in (ELCOMETER, FISCHER, POSITECTOR, ROBOT)]
+    readings = [path.read_bytes() for path in sorted(LAYOUTS.glob('*.txt'))]
     model = (SAMPLES.parents[3] / 'config/model.yaml').read_bytes()
     campaign = (SAMPLES / 'measured_door/campaign.yaml').read_bytes()
     return {
         'rapid': Target(
-            '.mod', read_recording, [RAPID],
+            '.mod', pd.read_recording, [RAPID],
             r'PROC ENDPROC MoveL MoveC PaintL TriggL SetDO SetAO Offs( RelTool( wobj0 [[ ]] := '
             '{1} .trans /0 not 9E9 - FOR WHILE TRUE DO ENDFOR IF TEST RETURN Incr UseBrushTab ,',
         ),
-        'readings': Target('.csv', read_readings, readings, cells),
+        'readings': Target('.csv', pd.read_readings, readings, cells),
         'gauge_json': Target(
-            '.json', read_readings, [GAUGE_JSON], '[ ] { } , : " null NaN 1e999 -1 "x": [[ []',
+            '.json', pd.read_readings, [GAUGE_JSON], '[ ] { } , : " null NaN 1e999 -1 "x": [[ []',
         ),
-        'gauge_zip': Target('.zip', read_readings, [_written(_batch, 'B1.zip')]),
+        'gauge_zip': Target('.zip', pd.read_readings, [_written(_batch, 'B1.zip')]),
         'measuring_points': Target(
             '.csv', lambda path: MeasuringPoints.read(path, Layout(), None), [points], cells
         ),
         'points': Target('.csv', read_points, [points], cells),
-        'poses': Target('.csv', read_recording, [*POSES], cells),
-        'workbook': Target('.xlsx', read_readings, [book]),
+        'poses': Target('.csv', pd.read_recording, [*POSES], cells),
+        'workbook': Target('.xlsx', pd.read_readings, [book]),
         'worksheet': Target(
-            '.xlsx', read_readings, [_member(book, 'sheet1.xml')],
+            '.xlsx', pd.read_readings, [_member(book, 'sheet1.xml')],
             '<c r="A1"> <v> </v> t="s" t="d" AAAAA99999999', _in_zip(book, 'sheet1.xml'),
         ),
         'stl': Target('.stl', _mesh, [_box('stl'), _box('stl_ascii')], 'solid facet vertex'),
@@ -254,8 +253,8 @@ def targets() -> dict[str, Target]:
             '.yaml', _metadata, [(SAMPLES / 'panel_577/metadata.yaml').read_bytes()],
             'custom_data: model_sha256: &a *a null [] {}',
         ),
-        'zones': Target('.yaml', lambda path: read_zones(path, SAMPLES / 'panel.stl'), [ZONES]),
+        'zones': Target('.yaml', lambda path: pd.read_zones(path, SAMPLES / 'panel.stl'), [ZONES]),
         'sweep': Target('.yaml', read_sweep, [SWEEP], 'grid: cases: sample: vary: &a *a null'),
-        'campaign': Target('.yaml', read_campaign, [campaign], '&a *a <<: tf: points:'),
-        'urdf': Target('.urdf', Robot.read, [urdf().encode()], '<mimic xyz="1"'),
+        'campaign': Target('.yaml', pd.read_campaign, [campaign], '&a *a <<: tf: points:'),
+        'urdf': Target('.urdf', Robot.read, [URDF.read_bytes()], '<mimic xyz="1"'),
     }  # fmt: skip

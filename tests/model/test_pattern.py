@@ -1,4 +1,4 @@
-"""Eq. (1): both Gaussians integrate to one, so that K1 is the volume that lands a second."""
+"""Eqs. (1), (3), (4) and (5): pattern, collapse, and rasters of passes."""
 
 import math
 
@@ -9,9 +9,14 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.integrate import quad
 
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse, line_integral_um_m_per_s
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
+from patterns import PATTERNS
 
-PATTERNS = st.builds(
+ANY_PATTERN = st.builds(
     PlanarPattern, K1_cm3_per_s=st.floats(0.01, 100.0), K2=st.floats(0.0, 1.0),
     K3=st.floats(0.0, 1.0), phi_rad=st.floats(-6.28, 6.28), r_m=st.floats(0.0, 1.0),
     sigma1_m=st.floats(0.005, 1.0), sigma2_m=st.floats(0.005, 1.0),
@@ -55,13 +60,15 @@ def test_enclosed_fraction_is_the_integral_up_to_there(radius_m, r_m):
     assert pattern.enclosed_fraction(radius_m) == pytest.approx(expected, abs=1e-10)
 
 
-@given(pattern=PATTERNS, x_m=st.floats(-3.0, 3.0), y_m=st.floats(-3.0, 3.0))
+@given(pattern=ANY_PATTERN, x_m=st.floats(-3.0, 3.0), y_m=st.floats(-3.0, 3.0))
 def test_flux_is_never_negative_and_nowhere_above_the_peak(pattern, x_m, y_m):
     flux = float(pattern.flux_um_per_s(x_m, y_m))
     assert 0.0 <= flux <= 1.001 * pattern.peak_flux_um_per_s
 
 
-@given(pattern=PATTERNS, fraction=st.sampled_from([1e-3, 1e-6, 1e-9]), angle=st.floats(-3.2, 3.2))
+@given(
+    pattern=ANY_PATTERN, fraction=st.sampled_from([1e-3, 1e-6, 1e-9]), angle=st.floats(-3.2, 3.2)
+)
 def test_beyond_its_radius_the_flux_is_negligible(pattern, fraction, angle):
     rho = pattern.radius_of_flux_m(fraction) * np.linspace(1.0, 1.5, 50)
     beyond = pattern.flux_um_per_s(rho * math.cos(angle), rho * math.sin(angle))
@@ -76,3 +83,113 @@ def test_beyond_its_radius_the_flux_is_negligible(pattern, fraction, angle):
 def test_impossible_parameters_are_refused(wrong):
     with pytest.raises(ValidationError, match=next(iter(wrong))):
         PlanarPattern(**wrong)
+
+
+EQ3 = ThreeGaussianCollapse(
+    K1_um_m=9.0, K2_um_m=6.0, K3_um_m=8.0,
+    r1_m=0.22, r2_m=0.2, sigma1_m=0.09, sigma2_m=0.1, sigma3_m=0.15,
+)  # fmt: skip
+
+
+def test_eq3_is_the_papers_formula():
+    x, c = 0.13, EQ3
+    expected = (
+        1.0
+        / (3.0 * math.sqrt(2.0 * math.pi))
+        * (
+            c.K1_um_m / c.sigma1_m * math.exp(-((x - c.r1_m) ** 2) / (2 * c.sigma1_m**2))
+            + c.K2_um_m / c.sigma2_m * math.exp(-((x + c.r2_m) ** 2) / (2 * c.sigma2_m**2))
+            + c.K3_um_m / c.sigma3_m * math.exp(-(x**2) / (2 * c.sigma3_m**2))
+        )
+    )
+    assert c.thickness_um(x) == pytest.approx(expected, rel=1e-14)
+    assert c.components_um(np.full((4, 2), x)).shape == (3, 4, 2)
+
+
+def test_eq3_area_is_a_third_of_the_gains():
+    area, _ = quad(EQ3.thickness_um, -2.0, 2.0, epsabs=1e-12, points=[0.0])
+    assert pytest.approx(area, rel=1e-10) == EQ3.area_um_m
+    assert EQ3.scaled(3.0).area_um_m == pytest.approx(3.0 * EQ3.area_um_m)
+    assert EQ3.thickness_um(EQ3.reach_m) < 1e-8 * EQ3.thickness_um(0.0)
+
+
+@pytest.mark.parametrize('name', PATTERNS)
+@pytest.mark.parametrize('travel_rad', [0.0, 2.5])
+def test_line_integral_matches_adaptive_quadrature_of_eq1(name, travel_rad):
+    planar = PATTERNS[name]
+    along = np.array([math.cos(travel_rad), math.sin(travel_rad)])
+    left = np.array([-along[1], along[0]])
+    distances = np.array([-0.31, -0.02, 1e-5, 0.1, 0.25])
+    film = line_integral_um_m_per_s(planar, distances, travel_rad)
+    for distance, got in zip(distances, film, strict=True):
+
+        def flux(t, distance=distance):
+            x, y = t * along + distance * left
+            return float(planar.flux_um_per_s(x, y))
+
+        expected = sum(
+            quad(flux, a, b, epsabs=1e-11, epsrel=1e-11, limit=400)[0]
+            for a, b in [(-2.0, -0.3), (-0.3, 0.0), (0.0, 0.3), (0.3, 2.0)]
+        )
+        assert got == pytest.approx(expected, abs=1e-10 * film.max())
+
+
+MIRRORED = ThreeGaussianCollapse(
+    K1_um_m=6.0, K2_um_m=9.0, K3_um_m=8.0,
+    r1_m=0.2, r2_m=0.22, sigma1_m=0.1, sigma2_m=0.09, sigma3_m=0.15,
+)  # fmt: skip
+INDICES_M = (0.2, 0.31, 0.577, 0.8)
+
+
+def sigma_n_by_quadrature(collapse, index_m):
+    """Eqs. (4) and (5) to the letter, adaptively."""
+    mean = collapse.area_um_m / index_m
+    images = np.arange(-40, 41) * index_m
+
+    def integrand(x):
+        return (collapse.thickness_um(x + images).sum() / mean - 1.0) ** 2
+
+    value, _ = quad(
+        integrand, -0.5 * index_m, 0.5 * index_m, epsabs=1e-14, epsrel=1e-12, limit=500
+    )
+    return math.sqrt(value / index_m)
+
+
+@pytest.mark.parametrize('index_m', INDICES_M)
+def test_sigma_n_matches_adaptive_quadrature(index_m):
+    expected = sigma_n_by_quadrature(EQ3, index_m)
+    assert ParallelPasses.one_way(EQ3).sigma_n(index_m) == pytest.approx(expected, abs=1e-9)
+
+
+def test_single_gaussian_has_its_known_sigma_n():
+    """One Gaussian: sigma_n^2 = 2 sum exp(-(2 pi k sigma / index)^2)."""
+    sigma, index = 0.12, 0.4
+    one = ThreeGaussianCollapse(
+        K1_um_m=3.0, K2_um_m=2.0, K3_um_m=1.0, r1_m=0.0, r2_m=0.0,
+        sigma1_m=sigma, sigma2_m=sigma, sigma3_m=sigma,
+    )  # fmt: skip
+    k = np.arange(1, 20)
+    expected = math.sqrt(2.0 * np.sum(np.exp(-((2.0 * math.pi * k * sigma / index) ** 2))))
+    assert ParallelPasses.one_way(one).sigma_n(index) == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ('index_m', 'percent'), [(0.525, 10.8), (0.577, 3.4), (0.600, 4.8), (0.625, 9.2)]
+)
+def test_ring_pattern_is_most_even_near_its_half_width(index_m, percent):
+    """Figures computed apart from this code for (K2, r, s1, s2) = (0.15, 220, 90, 150 mm)."""
+    planar = PlanarPattern(K2=0.15, K3=0.0, r_m=0.22, sigma1_m=0.09, sigma2_m=0.15)
+    raster = ParallelPasses.one_way(sampled_collapse(DepositionModel(planar=planar), 0.2))
+    assert 100.0 * raster.sigma_n(index_m) == pytest.approx(percent, abs=0.06)
+
+
+def test_alternating_mirrored_passes():
+    raster = ParallelPasses(EQ3, MIRRORED)
+    index = 0.5
+    x = np.linspace(0.0, 2.0 * index, 4001)[:-1]
+    by_hand = sum(
+        EQ3.thickness_um((x - k * index) * (-1.0 if k % 2 else 1.0)) for k in range(-10, 12)
+    )
+    np.testing.assert_allclose(raster.thickness_um(index, x), by_hand, rtol=1e-12)
+    assert raster.sigma_n(index) == pytest.approx(by_hand.std() / by_hand.mean(), rel=1e-9)
+    assert raster.sigma_n(index) > 1.01 * ParallelPasses.one_way(EQ3).sigma_n(index)

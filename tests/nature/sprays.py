@@ -53,16 +53,10 @@ def sprays(table: Path, nozzle: str) -> dict[Spray, np.ndarray]:
 
 
 def spray_campaign(
-    table: Path,
-    nozzle: str,
-    folder: Path,
-    *,
-    heights_in: Sequence[int] = HEIGHTS_IN,
-    as_repeats: bool = False,
-    hanging: str = 'column',
-    told_times: float = 1.0,
+    table: Path, nozzle: str, folder: Path, *, heights_in: Sequence[int] = HEIGHTS_IN,
+    as_repeats: bool = False, hanging: str = 'column', told_times: float = 1.0,
     told_off_m: float = 0.0,
-) -> Path:
+) -> Path:  # fmt: skip
     """Write the campaign of a nozzle into an empty folder and return its ``campaign.yaml``.
 
     Args:

@@ -14,14 +14,9 @@ class NodeProcess:
     """
 
     def __init__(
-        self,
-        log: Path,
-        executable: str,
-        *,
-        code: str = '',
-        ros_arguments: tuple[str, ...] = (),
+        self, log: Path, executable: str, *, code: str = '', ros_arguments: tuple[str, ...] = (),
         **parameters: object,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._out, self._err = log.with_suffix('.out'), log.with_suffix('.err')
         program = code or (
             f'import sys; from paint_deposition.nodes.executables import {executable}; '
@@ -35,11 +30,8 @@ class NodeProcess:
         with self._out.open('wb') as out, self._err.open('wb') as err:
             self._process = subprocess.Popen(
                 [sys.executable, '-c', program, '--ros-args', *arguments, *ros_arguments],
-                stdout=out,
-                stderr=err,
-                env=os.environ | {'PYTHONUNBUFFERED': '1'},
-                cwd=log.parent,
-            )
+                stdout=out, stderr=err, env=os.environ | {'PYTHONUNBUFFERED': '1'}, cwd=log.parent,
+            )  # fmt: skip
 
     @property
     def out(self) -> str:

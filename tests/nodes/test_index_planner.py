@@ -12,10 +12,8 @@ from paint_msgs.action import PlanPasses
 from paint_msgs.srv import RecommendIndex
 from rclpy.action import ActionClient
 
+import paint_deposition as pd
 from nodes.cell import PANEL_M, parameters, write_panel
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.model_file import write_model
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
@@ -24,7 +22,7 @@ from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest, PlanRequest
 
 COARSE = {'max_edge_length_m': 0.05, 'speed_m_per_s': 0.25}
-NARROW = DepositionModel(planar=PlanarPattern(K3=0.0, r_m=0.11, sigma1_m=0.045, sigma2_m=0.075))
+NARROW = pd.DepositionModel(planar=PlanarPattern(K3=0.0, r_m=0.11, sigma1_m=0.045, sigma2_m=0.075))
 
 
 @pytest.fixture
@@ -52,7 +50,7 @@ def test_answer_is_the_recommendation_or_why_there_is_none(planner, ask, viewer,
     node = planner()
     answer = ask(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
     expected = recommend(
-        DepositionModel(), IndexRequest(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
+        pd.DepositionModel(), IndexRequest(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
     )
     assert answer.success
     assert answer.index_m == expected.index_m
@@ -83,7 +81,7 @@ def test_answer_is_the_recommendation_or_why_there_is_none(planner, ask, viewer,
 
 
 def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path):
-    write_model(tmp_path / 'narrow.yaml', NARROW)
+    pd.write_model(tmp_path / 'narrow.yaml', NARROW)
     (tmp_path / 'broken.yaml').write_text('planar: {K9: 1}\n')
     node = planner()
     wide = ask(speed_m_per_s=0.2, index_min_m=0.5, index_max_m=0.7).index_m
@@ -146,8 +144,8 @@ def test_passes_are_planned_with_feedback(planner, pursue, viewer, wait_until, t
     status, result, heard = pursue(mesh_file=str(mesh), target_um=15.0, direction='vertical')
     assert status == GoalStatus.STATUS_SUCCEEDED, result.message
     expected = plan(
-        read_mesh(mesh, max_edge_length_m=0.05),
-        DepositionModel(),
+        pd.read_mesh(mesh, max_edge_length_m=0.05),
+        pd.DepositionModel(),
         PlanRequest(direction='vertical', target_um=15.0),
     )
     assert result.message == expected.sentence

@@ -6,24 +6,21 @@ from paint_msgs.msg import ComparisonStats
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
+import paint_deposition as pd
 from nodes.cell import offline_um, parameters, two_passes, write_panel
 from paint_deposition.effects.catalogue import effect_class
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PaintError
 from paint_deposition.files.gauge_readings import write_table
-from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.comparison.regions import radius_of_readings_m
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN
+from paint_deposition.report.colour_scales import BARE_RGB
 
 MOTION = two_passes()
-TRUTH = DepositionModel().with_effect(effect_class('air_drift')(shift_down_m=0.08))
+TRUTH = pd.DepositionModel().with_effect(effect_class('air_drift')(shift_down_m=0.08))
 SIGMA_UM = 0.2
 
 
@@ -31,7 +28,7 @@ SIGMA_UM = 0.2
 def readings(tmp_path):
     """A file of forty noisy readings of the true film, each place measured twice."""
     rng = np.random.default_rng(11)
-    surface = read_mesh(write_panel(tmp_path / 'panel.stl'), 1.0, 0.05)
+    surface = pd.read_mesh(write_panel(tmp_path / 'panel.stl'), 1.0, 0.05)
     places = np.column_stack(
         [rng.uniform(-0.25, 0.25, 20), np.zeros(20), rng.uniform(-0.25, 0.25, 20)]
     )
@@ -65,7 +62,7 @@ def viewer(onlooker):
 
 
 def _true_model(tmp_path) -> str:
-    write_model(tmp_path / 'truth.yaml', TRUTH)
+    pd.write_model(tmp_path / 'truth.yaml', TRUTH)
     return str(tmp_path / 'truth.yaml')
 
 
@@ -161,7 +158,7 @@ def test_bad_input_is_one_line(comparison):
         ({'mesh_file': ''}, 'mesh_file is empty'),
         ({'mesh_scale': 0.01}, "lie off the part's surface"),
     ):
-        with pytest.raises(PaintError, match=words) as caught:
+        with pytest.raises(pd.PaintError, match=words) as caught:
             comparison(**values)
         assert '\n' not in str(caught.value)
 

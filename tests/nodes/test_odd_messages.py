@@ -19,7 +19,7 @@ from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
 from paint_deposition.nodes.web_view import WebView
-from robot_arm import urdf
+from robot_arm import URDF
 
 MESSAGES = int(os.environ.get('PAINT_MESSAGES', '60'))
 MOTION = two_passes()
@@ -32,8 +32,6 @@ def nodes(tmp_path):
     readings = tmp_path / 'readings.csv'
     readings.write_text('x_m,y_m,z_m,thickness_um\n' + '0.0,0.0,0.1,20\n0.1,0.0,0.1,21\n' * 3)
     bag = str(write_pose_bag(tmp_path / 'pass', MOTION))
-    arm = tmp_path / 'arm.urdf'
-    arm.write_text(urdf())
     signal = {'trigger': 'gun', 'flow': 'flow'}
     films = {'output_directory': str(tmp_path / 'films')}
     return {
@@ -41,7 +39,7 @@ def nodes(tmp_path):
         'comparison': (ModelComparison, mesh | {'measurements_file': str(readings)}),
         'web_view': (WebView, mesh | {'port': 0}),
         'recorder': (RunRecorder, {'output_directory': str(tmp_path / 'runs'), 'name': 'run'}),
-        'joints': (AtomizerSource, {'urdf_file': str(arm), **signal}),
+        'joints': (AtomizerSource, {'urdf_file': str(URDF), **signal}),
         'tf': (AtomizerSource, {'base_link': 'base', 'tip_link': 'tool0', **signal}),
         'trigger': (AtomizerSource, signal),
         'player': (BagPlayer, {'bag': bag, 'rate': 0.0, 'loop': True, 'publish_clock': False}),

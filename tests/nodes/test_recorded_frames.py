@@ -10,10 +10,9 @@ from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
+import paint_deposition as pd
 from nodes.cell import offline_um, parameters, two_passes
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.motion.part_frame import Rigid
-from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.bags.bag_player import BagPlayer
 from paint_deposition.nodes.runtime.topics import header
 
@@ -24,9 +23,9 @@ SET_PARAMETERS = '/deposition_simulator/set_parameters'
 HAS_TF = importlib.util.find_spec('tf2_msgs') is not None
 
 
-def in_the_cell() -> Trajectory:
+def in_the_cell() -> pd.Trajectory:
     poses = Rigid.of(PART_POSE).applied(MOTION.positions_m, MOTION.quaternions_xyzw)
-    return Trajectory(MOTION.stamps_ns, *poses, 'base_link')
+    return pd.Trajectory(MOTION.stamps_ns, *poses, 'base_link')
 
 
 @pytest.fixture
@@ -47,7 +46,7 @@ def recorded(simulator, record, robot, painted, wait_until):
 
 def test_it_is_simulated_with_the_recorded_pose_of_the_part(recorded, start, simulator, capfd):
     run, film = recorded
-    read = read_recording(run)
+    read = pd.read_recording(run)
     assert read.frame_id == 'part'
     assert "'base_link' to 'part'" in read.notes[-1]
     assert film.max() > 2.0

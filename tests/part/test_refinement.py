@@ -9,11 +9,12 @@ from paint_deposition.errors import MeshError
 from paint_deposition.part.edges import Edges, coarse_faces
 from paint_deposition.part.refinement import face_areas_m2, refine
 from paint_deposition.part.surface import Surface
+from surfaces import ball, flat, triangulated
 
 
 @pytest.mark.parametrize('max_edge_length_m', [0.05, 0.02, 0.007])
-def test_area_is_kept_and_edges_are_short(triangles, ball, max_edge_length_m):
-    vertices, faces = triangles(ball(0.5), 0.06, jitter=0.3)
+def test_area_is_kept_and_edges_are_short(max_edge_length_m):
+    vertices, faces = triangulated(ball(0.5), 0.06, jitter=0.3)
     surface = Surface.from_triangles(vertices, faces, max_edge_length_m)
     assert surface.area_m2 == pytest.approx(face_areas_m2(vertices, faces).sum(), rel=1e-12)
     assert surface.longest_edge_m <= max_edge_length_m
@@ -72,9 +73,9 @@ def rim_length_m(vertices, faces):
     return np.linalg.norm(vertices[faces.ravel()[single]] - ends, axis=1).sum()
 
 
-def test_too_many_triangles_are_refused_with_an_edge_length(triangles, flat):
+def test_too_many_triangles_are_refused_with_an_edge_length():
     with pytest.raises(MeshError, match=r'max_edge_length_m = 0\.0001 m .* at least 0\.\d+ m'):
-        Surface.from_triangles(*triangles(flat, 0.2), 1e-4)
+        Surface.from_triangles(*triangulated(flat, 0.2), 1e-4)
 
 
 def test_a_picture_has_triangles_as_large_as_its_cells_and_joins_no_patches():

@@ -14,12 +14,11 @@ import paint_deposition as pd
 import robot_arm
 from cli.command import paint
 from paint_deposition.api.planning import place, read_robot
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PaintError, PlanError
+from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.part_frame import Rigid, at_part, moved
-from paint_deposition.planning.driving import PartPlaces
 from paint_deposition.planning.joints import starts
+from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import driven, plan
 from paint_deposition.planning.requests import PlanRequest
 from planning.test_surface_map import sheet
@@ -27,7 +26,7 @@ from scenes import painted
 
 pytestmark = pytest.mark.slow
 
-ROUND = DepositionModel(
+ROUND = pd.DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.0, r_m=0.05, sigma1_m=0.03, sigma2_m=0.04)
 )
 # The part lies on its back: the gun looks along its +y, which is down.
@@ -36,15 +35,8 @@ PART_POSE = [0.9, 0.0, 0.5, *LYING]
 
 
 @pytest.fixture(scope='module')
-def urdf(tmp_path_factory):
-    path = tmp_path_factory.mktemp('robot') / 'arm.urdf'
-    path.write_text(robot_arm.urdf())
-    return path
-
-
-@pytest.fixture(scope='module')
-def cell(urdf):
-    return read_robot(urdf, PART_POSE)
+def cell():
+    return read_robot(robot_arm.URDF, PART_POSE)
 
 
 @pytest.fixture(scope='module')
@@ -118,7 +110,7 @@ def test_a_slow_joint_slows_its_passes_each_as_a_whole(planned, cell, on_robot):
 
 
 def test_the_tool_rolls_where_its_pattern_is_round_only(planned, cell, on_robot):
-    lopsided = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.3))
+    lopsided = pd.DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.3))
     kept = driven(plan(planned.surface, lopsided, PlanRequest(speed_m_per_s=0.2), 'part'), cell)
     for one, rolls in ((on_robot, True), (kept, False)):
         plain = one.trajectory.quaternions_xyzw[0]
@@ -148,13 +140,13 @@ def test_what_cannot_be_driven_says_where(planned, cell, place_m, words):
         replace(cell, part=part).drive(planned.trajectory, free_roll=False)
 
 
-def test_a_robot_without_speeds_is_refused(urdf, tmp_path):
+def test_a_robot_without_speeds_is_refused(tmp_path):
     unknown = tmp_path / 'unknown.urdf'
-    unknown.write_text(urdf.read_text().replace(' velocity="1"', '', 1))
+    unknown.write_text(robot_arm.URDF.read_text().replace(' velocity="1"', '', 1))
     with pytest.raises(PlanError, match='no greatest speed of shoulder_pan'):
         read_robot(unknown, PART_POSE)
-    with pytest.raises(PaintError, match='give seven numbers'):
-        read_robot(urdf, [1.0, 2.0])
+    with pytest.raises(pd.PaintError, match='give seven numbers'):
+        read_robot(robot_arm.URDF, [1.0, 2.0])
 
 
 def test_places_of_the_part_are_those_that_can_be_driven(planned, cell):
@@ -180,14 +172,14 @@ def test_the_place_to_choose_has_good_neighbours(cell):
     assert 'not all places beside it were tried' in alone.sentence
 
 
-def test_the_commands_write_what_the_robot_drives(planned, cell, urdf, tmp_path):
+def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
     trimesh.Trimesh(planned.surface.vertices_m, planned.surface.faces, process=False).export(
         tmp_path / 'flat.stl'
     )
     model = tmp_path / 'round.yaml'
     pd.write_model(model, ROUND)
     part = '--mesh', tmp_path / 'flat.stl', '--max-edge-length-m', 0.05
-    robot = '--urdf', urdf, '--tip-link', 'tool0', '--part-pose', *PART_POSE
+    robot = '--urdf', robot_arm.URDF, '--tip-link', 'tool0', '--part-pose', *PART_POSE
     done = paint('plan', *part, '--model', model, '--speed', 0.2, *robot, '-o', tmp_path / 'plan')
     assert done.returncode == 0, done.stderr
     assert 'driven as planned' in done.stdout
@@ -209,6 +201,6 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, urdf, tmp_path)
     done = paint('place', *given, *grid, '-o', tmp_path / 'place', '--json')
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)['reached'] == [[1.0]]
-    done = paint('place', *given[:2], '--urdf', urdf, '-o', tmp_path / 'place')
+    done = paint('place', *given[:2], '--urdf', robot_arm.URDF, '-o', tmp_path / 'place')
     assert done.returncode == 2
     assert '--part-pose' in done.stderr

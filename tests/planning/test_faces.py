@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from folded_parts import bumper, hood
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.part.surface import Surface
 from paint_deposition.planning.faces import join_motions, order_faces, plan_faces
 from paint_deposition.planning.passes import PassStyle, PlannedPass
 from paint_deposition.planning.planned_film import contacts
@@ -14,7 +13,7 @@ from paint_deposition.planning.requests import PlanRequest
 from scenes import painted
 from surfaces import solid
 
-NARROW = DepositionModel(
+NARROW = pd.DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.0, r_m=0.1, sigma1_m=0.042, sigma2_m=0.07)
 )
 
@@ -58,7 +57,7 @@ def test_the_motion_has_no_jump_and_keeps_clear(planned):
 @pytest.mark.slow
 def test_the_back_of_a_closed_part_stays_bare():
     sheet = hood(0.08)
-    surface = Surface.from_triangles(*solid(sheet.vertices_m, sheet.faces, 0.002), 1.0)
+    surface = pd.Surface.from_triangles(*solid(sheet.vertices_m, sheet.faces, 0.002), 1.0)
     found = plan_faces(surface, NARROW, PlanRequest(target_um=20.0, outward=(0.0, 0.0, 1.0)))
     assert len(found.faces) == 2
     assert found.statistics.area_m2 == pytest.approx(sheet.area_m2, rel=0.05)

@@ -64,7 +64,7 @@ def test_placing_beats_the_plane_s_recommendation_and_neighbouring_indices(plann
     for beside in (0.97 * index, 1.03 * index):
         other = place_passes(films, across, (beside, beside))
         assert other.index_m == pytest.approx(beside)
-        np.testing.assert_allclose(np.diff(other.lines_m), beside, atol=1e-9)
+        np.testing.assert_allclose(np.diff(other.lines_m('horizontal')), beside, atol=1e-9)
         assert other.sigma_n > 0.97 * planned.placement.sigma_n
     assert 0.22 <= place_passes(films, across, (0.22, 0.3)).index_m <= 0.3
 

@@ -1,7 +1,10 @@
-"""The picture of a painted part: seen from the gun's side, gravity down, with what rays meet."""
+"""The pictures of a painted part and of profiles, and names from files that are never run."""
 
+import csv
 import io
 import re
+from dataclasses import replace
+from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -9,14 +12,24 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+import paint_deposition as pd
 from booth import door, panel, serpentine
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.film.statistics import film_statistics
+from paint_deposition.inference.comparison.comparison import compare
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.page import report_html
 from paint_deposition.report.pictures.film import film_picture
 from paint_deposition.report.pictures.part import PartPicture, View, label_points
+from paint_deposition.report.pictures.readings import comparison_figure
 from paint_deposition.report.style import BELOW, HIGH, WITHIN, save_picture
+from small_campaign import small_campaign
 from surfaces import triangulated
 
 X, Y, Z = np.eye(3)
@@ -168,3 +181,74 @@ def test_a_point_is_labelled_beside_what_is_written_there():
     label_points(axes, np.zeros((1, 2)), ['1'], 1.0)
     (label,) = axes.texts[1:]
     assert np.hypot(*(np.subtract(label.get_position(), 9.0))) > 9.0
+
+
+@pytest.mark.slow
+def test_thicker_columns_are_not_cut_off_by_a_thin_one(tmp_path):
+    study = Study.of(small_campaign(tmp_path, experiments=('door',), style='columns'))
+    data = ReportData((compare(study, DepositionModel()),))
+    thin = data.profiles[0]
+    thick = replace(thin, lines_um=2.0 * thin.lines_um)
+    vars(data)['profiles'] = [thin, thick]
+    figure = comparison_figure(data)
+    tops_um = [film.get_ylim()[1] for film in figure.axes[::2]]
+    assert tops_um[0] == tops_um[1] > np.max(thick.lines_um[0])
+    few = replace(thin, line_m=np.empty(0), lines_um=np.empty((1, 0)), passes_um=np.empty((0, 0)))
+    vars(data)['profiles'] = [few]
+    assert len(comparison_figure(data).axes) == 2
+
+
+HOSTILE = '</script><script>alert(1)</script><img src=x onerror="alert(2)">\'"'
+
+
+class Elements(HTMLParser):
+    """The tags of a page, and whatever would run when it is opened."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.scripts, self.handlers = 0, []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.scripts += tag == 'script'
+        self.handlers += [name for name, _ in attributes if name.startswith('on')]
+
+
+@pytest.mark.parametrize(
+    'name', ["=cmd|' /C calc'!A0", '+1+1', '-2+3', '@SUM(A1)', '-P1', '=1,"2"', '\t=1']
+)
+def test_a_name_is_no_formula_in_a_table_and_comes_back_as_it_was(name, tmp_path):
+    rows = [['point', 'x_m', 'y_m', 'z_m', 'thickness_um'], [name, '-0.1', '+0.2', '1e-3', '20']]
+    write_table(tmp_path / 'readings.csv', rows)
+    with (tmp_path / 'readings.csv').open(newline='') as file:
+        _, cells = csv.reader(file)
+    assert cells == [f"'{name}", *rows[1][1:]]
+    assert pd.read_readings(tmp_path / 'readings.csv').point.tolist() == [name.strip()]
+
+
+@pytest.mark.parametrize('mark', ['\r', '\n', '\u2028', '\u2029', '\x85', '\x0c', '\0'])
+def test_a_name_stays_in_the_comment_of_a_model(mark, tmp_path):
+    hostile = f'door{mark}effects: [{{file: evil.py}}]{mark}'
+    pd.write_model(tmp_path / 'model.yaml', pd.DepositionModel(), f'Calibrated on {hostile}')
+    assert pd.read_model(tmp_path / 'model.yaml') == pd.DepositionModel()
+
+
+@pytest.mark.slow
+def test_a_name_with_script_tags_is_text_in_the_report(tmp_path, undrawn):
+    """The name of a part, a batch and each point."""
+
+    def page(name: str) -> str:
+        campaign = small_campaign(tmp_path / str(len(name)), experiments=('door',))
+        (one,) = campaign.experiments
+        points = np.array([f'{name}{k}' for k in range(len(one.readings))])
+        named = Experiment.of(name, one.surface, one.path, replace(one.readings, point=points))
+        head = dict.fromkeys(('part', 'batch', 'paint', 'operator'), name)
+        study = Study.of(replace(campaign, experiments=(named,), head=head))
+        return report_html(ReportData((compare(study, pd.DepositionModel()),)))
+
+    plain, hostile = page('door'), page(HOSTILE)
+    assert '&lt;script&gt;alert(1)' in hostile
+    assert HOSTILE not in hostile
+    expected, found = Elements(plain), Elements(hostile)
+    assert found.scripts == expected.scripts
+    assert found.handlers == expected.handlers

@@ -12,10 +12,7 @@ import paint_deposition as pd
 from chromium import CHROMIUM, Chromium
 from paint_deposition.api.replaying import Replay
 from paint_deposition.cli.main import run
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PaintError
-from paint_deposition.files.motion_files import GunMotion, read_recording
-from paint_deposition.report.live.page import STEP_UM, Page, Scene, Seen
+from paint_deposition.report.live_page import STEP_UM, Page, Scene, Seen
 
 ARRAYS = {'float32': np.float32, 'uint32': np.uint32, 'uint16': np.uint16, 'uint8': np.uint8}
 
@@ -52,7 +49,7 @@ class Onlooker:
 def door(repository):
     """The sample door, coarse, and the motion over it."""
     samples = repository / 'ros2_ws/src/paint_deposition/samples'
-    motion = read_recording(samples / 'door_horizontal', state_topic='/atomizer/state')
+    motion = pd.read_recording(samples / 'door_horizontal', state_topic='/atomizer/state')
     return pd.read_mesh(samples / 'door.stl', max_edge_length_m=0.05), motion
 
 
@@ -104,7 +101,7 @@ def test_a_run_is_painted_as_simulate_paints_it(door):
     surface, motion = door
     film = pd.simulate(surface, motion, target_um=20.0, tolerance_um=3.0)
     wanted = {'rate': 0.0, 'target_um': 20.0, 'tolerance_um': 3.0}
-    replay = Replay(surface, [GunMotion('', motion)], [DepositionModel()], **wanted)
+    replay = Replay(surface, [('', motion)], [pd.DepositionModel()], **wanted)
     shown = []
     replay.scene.show_film = shown.append
     replay.paint(Event())
@@ -142,7 +139,7 @@ def test_a_page_for_other_machines_gets_a_token_and_one_for_this_machine_hears_i
     assert status(page.url) == 200
     assert status(page.url, Host='elsewhere.example') == 403
     assert urlopen(page.url).headers['Content-Security-Policy'].startswith("default-src 'self'")
-    with pytest.raises(PaintError, match='in use; choose another port'):
+    with pytest.raises(pd.PaintError, match='in use; choose another port'):
         Page(page.scene, port=int(page.url.split(':')[2].strip('/')))
 
 
@@ -166,7 +163,7 @@ def test_watch_says_what_it_lacks(words, reason, capsys):
 def test_a_painted_run_on_a_phone(door, tmp_path):
     surface, motion = door
     film = pd.simulate(surface, motion)
-    replay = Replay(surface, [GunMotion('', motion)], [DepositionModel()], rate=0.0)
+    replay = Replay(surface, [('', motion)], [pd.DepositionModel()], rate=0.0)
     replay.scene.tell('about', text='door.stl')
     replay.paint(Event())
     goes_on = Event()

@@ -1,19 +1,29 @@
-"""What the report calls a user's own effect: it reads as well as one of the library."""
+"""What the report calls and how it shows effects of users and learned laws."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
 
 from booth import SAMPLES
 from paint_deposition.effects.base import Effect, parameter
 from paint_deposition.effects.catalogue import LEARNED, load_effect_file
-from paint_deposition.effects.learned.law import PartGrid
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.law import WAVES, LearnedFootprint, LearnedMap, PartGrid
 from paint_deposition.effects.library.flow_drift import FlowDrift
-from paint_deposition.report.words import (
-    effect_meaning,
-    effect_name,
-    in_unit,
-    is_learned,
-    learned_words,
-    number,
-    parameter_words,
+from paint_deposition.inference.comparison.comparison import compare
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, FootprintProfile
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.report import words
+from paint_deposition.report.charts import (
+    footprint_figure,
+    learned_figure,
+    map_figure,
+    profile_figure,
 )
+from paint_deposition.report.data import ReportData
+from small_campaign import small_campaign
 
 
 class HoleBuild(Effect):
@@ -27,52 +37,149 @@ class HoleBuild(Effect):
 def test_the_unit_in_a_parameters_name_is_not_said_twice():
     wake = load_effect_file(SAMPLES / 'my_effect.py')
     unit = wake.parameters()['loss_per_m_per_s']['unit']
-    assert parameter_words('loss_per_m_per_s', unit) == 'loss'
-    assert in_unit(unit, 2e-9) == ('per m/s', '2 × 10⁻⁹')
+    assert words.parameter_words('loss_per_m_per_s', unit) == 'loss'
+    assert words.in_unit(unit, 2e-9) == ('per m/s', '2 × 10⁻⁹')
     unit = FlowDrift.parameters()['drift_per_pass']['unit']
-    assert (parameter_words('drift_per_pass', unit), in_unit(unit, 0.02)[0]) == (
+    assert (words.parameter_words('drift_per_pass', unit), words.in_unit(unit, 0.02)[0]) == (
         'drift', 'per pass',
     )  # fmt: skip
-    assert parameter_words('shift_down_m', 'm') == 'shift down'
-    assert parameter_words('gain', '1') == 'gain'
-    assert parameter_words('s', 's') == 's'
+    assert words.parameter_words('shift_down_m', 'm') == 'shift down'
+    assert words.parameter_words('gain', '1') == 'gain'
+    assert words.parameter_words('s', 's') == 's'
 
 
 def test_an_effect_without_a_docstring_is_told_by_its_signature_or_its_parameter():
-    assert effect_meaning(HoleBuild) == 'Share of paint more at holes.'
+    assert words.effect_meaning(HoleBuild) == 'Share of paint more at holes.'
     signed = type('Signed', (HoleBuild,), {'signature': 'more paint around holes'})
-    assert effect_meaning(signed) == 'More paint around holes.'
-    assert effect_meaning(FlowDrift) == FlowDrift.__doc__.splitlines()[0]
+    assert words.effect_meaning(signed) == 'More paint around holes.'
+    assert words.effect_meaning(FlowDrift) == FlowDrift.__doc__.splitlines()[0]
 
 
 def test_numbers_have_no_computers_exponent():
-    assert [number(v) for v in (0.0, 1234.0, -0.00012345, 2.5e-9, 4e8)] == [
+    assert [words.number(v) for v in (0.0, 1234.0, -0.00012345, 2.5e-9, 4e8)] == [
         '0', '1234', '−0.000123', '2.5 × 10⁻⁹', '4 × 10⁸',
     ]  # fmt: skip
 
 
 def test_learned_laws_are_told_by_what_they_depend_on():
     name = 'learned law over the time since the motion began'
-    assert effect_name('learned:time_s') == name
-    assert effect_name('edge_build and learned:time_s') == f'edge build and {name}'
-    assert is_learned('learned:time_s')
-    assert not is_learned('edge_build')
+    assert words.effect_name('learned:time_s') == name
+    assert words.effect_name('edge_build and learned:time_s') == f'edge build and {name}'
+    assert words.is_learned('learned:time_s')
+    assert not words.is_learned('edge_build')
 
 
 def test_a_learned_law_is_told_by_its_curve_and_its_range():
     law = LEARNED['time_s'](low=2.0, high=60.0, learned=(0.1, -0.25))
-    assert learned_words(law) == [('factor', '0.75 to 1.1', ''), ('over', '2 to 60', 's')]
+    assert words.learned_words(law) == [('factor', '0.75 to 1.1', ''), ('over', '2 to 60', 's')]
     passes = LEARNED['spray_pass'](low=0.0, high=5.0)
-    assert learned_words(passes)[1] == ('over', '1 to 6', '')
+    assert words.learned_words(passes)[1] == ('over', '1 to 6', '')
     fog = LEARNED['height_fraction'](kind='addition', learned=(2.0, -0.5))
-    assert learned_words(fog)[0] == ('addition', '−0.5 to 2', 'µm')
+    assert words.learned_words(fog)[0] == ('addition', '−0.5 to 2', 'µm')
     grid = PartGrid(
         part_m=(1.2, 0.1, 0.5), low_m=(-0.5, -0.2), high_m=(0.5, 0.2), columns=2, rows=2
     )
     map_ = LEARNED['place'](maps=(grid,), learned=(0.1, 0.0, 0.0, -0.2))
-    assert learned_words(map_) == [
+    assert words.learned_words(map_) == [
         ('factor', '0.8 to 1.1', ''), ('over', '1000 × 400', 'mm of a part'),
     ]  # fmt: skip
     # Mean and first harmonic add up on the heavier side.
     ring = LEARNED['footprint'](reach_m=0.3, learned=(0.0,) * 5 + (0.1, 0.2, 0.0, 0.0, 0.0))
-    assert learned_words(ring)[0] == ('factor', '0.9 to 1.3', '')
+    assert words.learned_words(ring)[0] == ('factor', '0.9 to 1.3', '')
+
+
+KNOTS = 24
+
+
+def like(covariate: str, low: float, high: float, curve, kind: str = 'factor'):
+    """A learned law with the values of a function at its knots."""
+    law = LEARNED[covariate](low=low, high=high, learned=(0.0,) * KNOTS)
+    many = np.linspace(low, high, 100_001)
+    at_knots = np.interp(law.knots, law.axis(many), curve(many))
+    return law.model_copy(update={'learned': tuple(at_knots), 'kind': kind})
+
+
+def squeezed(distance_m: np.ndarray) -> np.ndarray:
+    return 0.4 * np.exp(-((distance_m / 0.03) ** 2))
+
+
+@pytest.fixture(scope='module')
+def study(tmp_path_factory):
+    return Study.of(small_campaign(tmp_path_factory.mktemp('campaign')))
+
+
+def shown(study: Study, *effects) -> ReportData:
+    return ReportData((compare(study, DepositionModel(effects=effects)),))
+
+
+@pytest.mark.slow
+def test_a_curve_is_drawn_with_its_closed_form_and_with_its_band_if_it_is_known(study):
+    law = like('edge_distance_m', 0.0, 0.25, squeezed)
+    plain = learned_figure(shown(study, law))
+    curve = plain['charts'][0]['data'][0]
+    known = law.model_copy(update={'sd': (0.02,) * (KNOTS - 1) + (0.5,)})
+    figure = learned_figure(shown(study, known))
+    (chart,) = figure['charts']
+    band, again, *forms = chart['data']
+    assert again['y'] == pytest.approx(curve['y'])
+    assert ('dots: ' in chart['title']) == bool(forms)
+    low, high = np.split(band['y'], 2)
+    assert high[-1] - low[0] == pytest.approx(2.0 * 1.96 * 0.02)
+    # Far from the edge it is so wide that its lower end would take all film away.
+    assert low[-1] == 0.05
+    words = [entry['words'] for entry in figure['legend']]
+    assert words == [*(entry['words'] for entry in plain['legend']), '95 % band']
+
+
+@pytest.mark.slow
+def test_a_map_shows_what_it_does_where_the_readings_of_its_part_lie(study):
+    door = study.campaign.experiments[1].measured_points
+    place = {'low_m': (-0.4, -0.3), 'high_m': (0.4, 0.3), 'columns': 3, 'rows': 2}
+    learned = (-2.0, -2.0, -2.0, 0.1, 0.2, 0.3)
+    grids = (
+        PartGrid(part_m=tuple(door.extent_m.tolist()), **place),
+        PartGrid(part_m=(9.0, 9.0, 9.0), **place),
+    )
+    assert map_figure(shown(study)) is None
+    maps = map_figure(shown(study, LearnedMap(maps=grids, learned=learned * 2)))
+    [first, dots], [second] = (chart['data'] for chart in maps['charts'])
+    assert first['z'] == pytest.approx(np.array([[0.05, 0.05, 0.05], [1.1, 1.2, 1.3]]))
+    # Neutral is the middle of the colours.
+    assert first['zmin'] + first['zmax'] == pytest.approx(2.0)
+    assert second['z'] == pytest.approx(first['z'])
+    assert len(dots['x']) == len(door.positions_m)
+    titles = [chart['title'] for chart in maps['charts']]
+    assert titles == ['factor on door', 'factor on a part that was not measured here']
+    added = map_figure(shown(study, LearnedMap(maps=grids[:1], kind='addition', learned=learned)))
+    (chart,) = added['charts']
+    assert chart['data'][0]['z'] == pytest.approx(np.reshape(learned, (2, 3)))
+    assert chart['data'][0]['zmin'] + chart['data'][0]['zmax'] == pytest.approx(0.0)
+    assert chart['title'] == 'addition [µm] on door'
+
+
+@pytest.mark.slow
+def test_a_footprint_is_the_pattern_times_its_factor(study):
+    heavier_right = (0.0,) * WAVES + (0.1, 0.2, 0.0, 0.0, 0.0)
+    footprint = LearnedFootprint(reach_m=0.2, learned=heavier_right)
+    assert footprint_figure(shown(study)) is None
+    charts = footprint_figure(shown(study, footprint))['charts']
+    plain, learned, factor = (chart['data'][0] for chart in charts)
+    assert learned['z'] == pytest.approx(plain['z'] * factor['z'])
+    x, y = np.meshgrid(factor['x'], factor['y'])
+    at = np.argmin(np.hypot(x - 0.2, y))
+    assert factor['z'].flat[at] == pytest.approx(1.3, abs=0.03)
+    assert factor['z'][np.hypot(x, y) > 0.41] == pytest.approx(1.0)
+
+
+def test_the_footprint_is_shown_with_its_band(study):
+    radius_m, eq1 = np.array([0.0, 0.1, 0.2]), np.array([0.5, 1.0, 0.1])
+    profile = FootprintProfile(radius_m, eq1, eq1 + 0.1, np.array([0.5, 0.1, 0.01]))
+    figures = DiscrepancyFigures(0.02, 0.0, 0.03, 0.1, (0.06, 2.0), profile)
+    assert profile_figure(shown(study)) is None
+    diagnosed = replace(shown(study), diagnosis=SimpleNamespace(discrepancy=figures))
+    band, plain, found = profile_figure(diagnosed)['charts'][0]['data']
+    assert (plain['y'] == eq1).all()
+    assert (found['y'] == eq1 + 0.1).all()
+    low, high = band['y'][:3], band['y'][:2:-1]
+    assert low == pytest.approx(np.maximum(found['y'] - 1.96 * profile.sd, 0.0), abs=1e-4)
+    assert high == pytest.approx(found['y'] + 1.96 * profile.sd, abs=1e-4)

@@ -7,33 +7,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from files.recorded import POSE, START_NS, Messages, pose_entries, straight_pass, write_bag
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.messages import STATE_TYPE, Definition, standard
 from paint_deposition.motion.part_frame import Rigid
-from paint_deposition.motion.trajectory import Trajectory
 
 
-def same(read: Trajectory, written: Trajectory) -> bool:
+def same(read: pd.Trajectory, written: pd.Trajectory) -> bool:
     return read.frame_id == written.frame_id and all(
         np.array_equal(getattr(read, name), getattr(written, name))
         for name in (
-            'stamps_ns',
-            'positions_m',
-            'quaternions_xyzw',
-            'trigger_stamps_ns',
-            'trigger_flow',
+            'stamps_ns', 'positions_m', 'quaternions_xyzw', 'trigger_stamps_ns', 'trigger_flow',
         )
-    )
+    )  # fmt: skip
 
 
 def refusal(*arguments) -> str:
     with pytest.raises(RecordingError) as refused:
-        read_recording(*arguments)
+        pd.read_recording(*arguments)
     text = str(refused.value)
     assert '\n' not in text
     return text
@@ -46,7 +41,7 @@ def test_every_storage_and_spelling_of_the_topic(tmp_path, storage):
     name = 'made.bag' if storage == 'ros1' else 'made'
     path = write_bag(tmp_path / name, entries, storage)
     for topic in ('atomizer/pose', '/atomizer/pose', None):
-        assert same(read_recording(path, topic), written)
+        assert same(pd.read_recording(path, topic), written)
 
 
 def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
@@ -61,15 +56,15 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
         ('/state', START_NS + 5_002, messages.state(START_NS + 95, True, float('nan'), 64.0))
     ]
     folder = write_bag(tmp_path / 'two_triggers', sorted(entries, key=lambda entry: entry[1]))
-    gun = read_recording(folder, None, 'gun')
+    gun = pd.read_recording(folder, None, 'gun')
     assert gun.trigger_stamps_ns.tolist() == [START_NS + 700, START_NS + 900]
     assert gun.trigger_flow.tolist() == [1.0, 0.0]
-    state = read_recording(folder, None, '/state')
+    state = pd.read_recording(folder, None, '/state')
     assert state.trigger_stamps_ns.tolist() == [START_NS + 70, START_NS + 90, START_NS + 95]
     assert state.trigger_flow.tolist() == [0.8, 0.0, 1.0]
     # While it sprayed; a flow that is not known is no setting, nor is what is not filled.
     assert state.settings == {'flow': 0.8, 'voltage_kv': 62.0}
-    unused = read_recording(folder)
+    unused = pd.read_recording(folder)
     assert len(unused.trigger_stamps_ns) == 0
     assert unused.notes == (
         f'recording {folder}: /state (paint_msgs/msg/AtomizerState) and /gun (std_msgs/msg/Bool) '
@@ -82,7 +77,7 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
 def test_a_state_that_sprays_with_flow_0_is_noted(tmp_path):
     entries = pose_entries(straight_pass(triggers=False))
     entries.insert(1, ('/state', START_NS + 1, Messages().state(START_NS, True, 0.0, 60.0)))
-    recorded = read_recording(write_bag(tmp_path / 'run', entries), None, '/state')
+    recorded = pd.read_recording(write_bag(tmp_path / 'run', entries), None, '/state')
     assert recorded.trigger_flow.tolist() == [0.0]
     assert 'trigger /state says spraying with flow 0, which lays no paint' in recorded.notes[0]
 
@@ -92,7 +87,7 @@ def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
     entries = pose_entries(written, delay_ns=hour_ns)
     entries += [('/gun', START_NS + hour_ns, Messages().trigger(True))]
     folder = write_bag(tmp_path / 'other_clock', sorted(entries, key=lambda entry: entry[1]))
-    assert len(read_recording(folder)) == len(written)
+    assert len(pd.read_recording(folder)) == len(written)
     assert '3.6e+03 s off its own stamps' in refusal(folder, None, '/gun')
 
 
@@ -125,7 +120,7 @@ def test_poses_beside_service_events_are_read(tmp_path):
         run.write('/add/_service_event', b'\0\1\0\0', START_NS, START_NS)
         for message in bag.messages():
             run.write('/p', message.cdr, message.log_time_ns, message.log_time_ns)
-    assert same(read_recording(tmp_path / 'mixed'), written)
+    assert same(pd.read_recording(tmp_path / 'mixed'), written)
 
 
 def test_messages_that_nodes_leave_out_are_left_out_counted_and_refused_if_strict(tmp_path):
@@ -139,7 +134,7 @@ def test_messages_that_nodes_leave_out_are_left_out_counted_and_refused_if_stric
               (START_NS + 1, True, 0.5)]  # fmt: skip
     entries += [('/state', START_NS + k, messages.state(*state)) for k, state in enumerate(states)]
     path = write_bag(tmp_path / 'odd', entries)
-    read = read_recording(path, state_topic='/state')
+    read = pd.read_recording(path, state_topic='/state')
     rows = np.delete(np.arange(20), 5)
     assert np.array_equal(read.stamps_ns, written.stamps_ns[rows])
     assert np.array_equal(read.positions_m, written.positions_m[rows])
@@ -148,7 +143,7 @@ def test_messages_that_nodes_leave_out_are_left_out_counted_and_refused_if_stric
     assert "1 poses in frame 'nowhere', of which 'part' is not known at their time (" in said
     assert '3 states on /state, the first of them an atomizer state without a stamp' in said
     with pytest.raises(RecordingError, match='leave out --strict'):
-        read_recording(path, state_topic='/state', strict=True)
+        pd.read_recording(path, state_topic='/state', strict=True)
 
 
 def test_poses_of_several_frames_are_brought_to_the_part(tmp_path):
@@ -163,11 +158,11 @@ def test_poses_of_several_frames_are_brought_to_the_part(tmp_path):
     bare = write_bag(tmp_path / 'bare', entries)
     static = messages.transforms((START_NS, 'cell', 'part', place))
     placed = write_bag(tmp_path / 'placed', [('/tf_static', START_NS, static), *entries])
-    for read in (read_recording(bare, part_pose=place), read_recording(placed)):
+    for read in (pd.read_recording(bare, part_pose=place), pd.read_recording(placed)):
         assert (len(read), read.frame_id, read.warnings) == (20, 'part', ())
         assert np.allclose(read.positions_m, written.positions_m, atol=1e-12)
         assert np.allclose(read.quaternions_xyzw, written.quaternions_xyzw, atol=1e-12)
-    assert len(read_recording(bare)) == 8
+    assert len(pd.read_recording(bare)) == 8
 
 
 def test_poses_without_stamps_are_refused(tmp_path):
@@ -198,7 +193,7 @@ def test_a_part_of_a_split_bag_is_not_taken_for_the_whole(tmp_path):
     metadata = folder / 'metadata.yaml'
     both = re.sub(r'(\s*- )pass_0.mcap', r'\1pass_0.mcap\1pass_1.mcap', metadata.read_text())
     metadata.write_text(both)
-    (warning,) = read_recording(folder / 'pass_1.mcap', frame_id='door').warnings
+    (warning,) = pd.read_recording(folder / 'pass_1.mcap', frame_id='door').warnings
     assert warning.startswith('pass_1.mcap is one of the 2 files of a split bag; give its folder')
 
 
@@ -234,7 +229,7 @@ def test_no_flipped_bit_goes_unnoticed(tmp_path):
         flipped[position] ^= 1 << int(rng.integers(8))
         damaged.write_bytes(flipped)
         try:
-            assert same(read_recording(damaged, None, '/atomizer/state'), written)
+            assert same(pd.read_recording(damaged, None, '/atomizer/state'), written)
         except RecordingError:
             refused += 1
     assert refused > 8
@@ -243,6 +238,6 @@ def test_no_flipped_bit_goes_unnoticed(tmp_path):
 def test_flows_of_their_own_are_written_as_states_and_read_back(tmp_path):
     half = replace(straight_pass(5), trigger_flow=np.array([0.5, 0.0]))
     bag = write_pose_bag(tmp_path / 'half', half)
-    assert same(read_recording(bag, state_topic='/atomizer/state'), half)
+    assert same(pd.read_recording(bag, state_topic='/atomizer/state'), half)
     with open_bag(bag) as opened:
         assert opened.find('/atomizer/state').type == STATE_TYPE

@@ -1,24 +1,21 @@
-"""Motion from joint states and a URDF: the arm's tip, where its geometry says it is."""
+"""Motion, frames and triggers from joint states, transforms and any message of a bag."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from files.recorded import Messages, write_bag
+from files.recorded import Messages, pose_entries, straight_pass, write_bag
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.joint_states import Robot
-from robot_arm import JOINTS, TIP_M, sweep, tip_poses, urdf
+from paint_deposition.motion.part_frame import Rigid
+from robot_arm import JOINTS, TIP_M, URDF, sweep, tip_poses
 from scenes import stamps_ns
 
 TIMES_S = np.linspace(0.0, 3.0, 151)
-
-
-@pytest.fixture(scope='module')
-def arm(tmp_path_factory):
-    path = tmp_path_factory.mktemp('arm') / 'arm.urdf'
-    path.write_text(urdf())
-    return path
 
 
 def joint_bag(path, rows, storage='mcap'):
@@ -39,10 +36,10 @@ def rows_of(joints=None, names=JOINTS):
     ]
 
 
-def test_any_joints_agree_with_the_product_of_exponentials(arm):
+def test_any_joints_agree_with_the_product_of_exponentials():
     joints = np.random.default_rng(8).uniform(-3.5, 3.5, (40, 6))  # beyond their limits, too
     joints[0] = 0.0
-    robot = Robot.read(arm)
+    robot = Robot.read(URDF)
     assert (robot.base, robot.tip, robot.moving_joints) == ('base_link', 'tool0', list(JOINTS))
     positions, quaternions = robot.poses(joints)
     assert np.allclose(positions[0], TIP_M, atol=1e-9)
@@ -52,9 +49,9 @@ def test_any_joints_agree_with_the_product_of_exponentials(arm):
     assert apart.max() < 1e-8
 
 
-def test_joint_states_become_poses(arm, tmp_path):
+def test_joint_states_become_poses(tmp_path):
     bag = joint_bag(tmp_path / 'run.bag', rows_of(), 'ros1')
-    read = read_recording(bag, urdf=str(arm), frame_id='base_link')
+    read = read_recording(bag, urdf=str(URDF), frame_id='base_link')
     assert np.array_equal(read.stamps_ns, stamps_ns(TIMES_S))
     assert np.allclose(read.positions_m, tip_poses(sweep())[0], atol=1e-9)
     assert read.frame_id == 'base_link'
@@ -62,7 +59,7 @@ def test_joint_states_become_poses(arm, tmp_path):
     assert "pose of 'tool0' in 'base_link' by arm.urdf" in note
 
 
-def test_joints_in_any_order_and_in_messages_of_their_own(arm, tmp_path):
+def test_joints_in_any_order_and_in_messages_of_their_own(tmp_path):
     """The pan comes at half the rate from another controller; a gripper's joint is left out."""
     joints, rows = sweep(), []
     for row, (stamp, values) in enumerate(zip(stamps_ns(TIMES_S), joints, strict=True)):
@@ -71,14 +68,14 @@ def test_joints_in_any_order_and_in_messages_of_their_own(arm, tmp_path):
         if row % 2 == 0:
             rows.append(('/joint_states', stamp, ('shoulder_pan',), values[:1]))
     bag = joint_bag(tmp_path / 'run', rows)
-    read = read_recording(bag, '/joint_states', urdf=str(arm), frame_id='base_link')
+    read = read_recording(bag, '/joint_states', urdf=str(URDF), frame_id='base_link')
     # The pan is even in time, so that what is interpolated is exact.
     assert np.allclose(read.positions_m, tip_poses(joints)[0], atol=1e-9)
 
 
-def test_another_link_and_another_base(arm, tmp_path):
+def test_another_link_and_another_base(tmp_path):
     bag = joint_bag(tmp_path / 'run', rows_of())
-    given = {'urdf': str(arm), 'tip_link': 'wrist_roll_link', 'base_link': 'shoulder_pan_link'}
+    given = {'urdf': str(URDF), 'tip_link': 'wrist_roll_link', 'base_link': 'shoulder_pan_link'}
     read = read_recording(bag, **given, frame_id='shoulder_pan_link')
     joints = sweep()
     joints[:, 0] = 0.0  # the base turns along
@@ -98,18 +95,18 @@ def test_another_link_and_another_base(arm, tmp_path):
         ({'urdf': 'ARM', 'frame_id': 'door'}, "in frame 'base_link', the mesh in 'door'"),
     ],
 )
-def test_missing_links_and_joints_are_named(given, words, arm, tmp_path):
+def test_missing_links_and_joints_are_named(given, words, tmp_path):
     bag = joint_bag(tmp_path / 'run', rows_of()[:3])
-    given = {key: str(arm) if value == 'ARM' else value for key, value in given.items()}
+    given = {key: str(URDF) if value == 'ARM' else value for key, value in given.items()}
     with pytest.raises(RecordingError) as refused:
         read_recording(bag, **given)
     assert words in str(refused.value)
 
 
-def test_joints_that_are_not_recorded_are_named(arm, tmp_path):
+def test_joints_that_are_not_recorded_are_named(tmp_path):
     bag = joint_bag(tmp_path / 'run', rows_of(sweep()[:, :5], JOINTS[:5]))
     with pytest.raises(RecordingError, match=r'has nothing of wrist_roll of arm\.urdf'):
-        read_recording(bag, urdf=str(arm))
+        read_recording(bag, urdf=str(URDF))
 
 
 @pytest.mark.parametrize(
@@ -126,12 +123,166 @@ def test_what_is_no_robot_is_refused(text, words, tmp_path):
         Robot.read(tmp_path / 'robot.urdf', tip='tool0')
 
 
-def test_joint_states_that_are_not_finite_are_left_out_and_counted(arm, tmp_path):
+def test_joint_states_that_are_not_finite_are_left_out_and_counted(tmp_path):
     rows = rows_of()
     rows[20] = (*rows[20][:3], np.full(6, np.nan))
-    read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(arm), frame_id='base_link')
+    read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(URDF), frame_id='base_link')
     assert len(read) == len(rows) - 1
     assert np.isfinite(read.positions_m).all()
     assert '1 joint states on /joint_states with joints that are not finite' in ' '.join(
         read.warnings
     )
+
+
+IO = 'cell_msgs/msg/Io'
+TYPES = {
+    'cell_msgs/msg/Valve': 'bool open\nfloat64 pressure_bar\nstring label\n',
+    IO: 'int32[] states\nfloat64 level\nuint8 word\ncell_msgs/Valve[2] valves\n',
+    'cell_msgs/msg/Stamped': 'std_msgs/Header header\nint16 brush\n',
+}
+PASS = straight_pass(triggers=False)
+# The gun opens with the 10th pose and closes with the 40th.
+ON = np.zeros(len(PASS), dtype=bool)
+ON[10:40] = True
+
+
+@pytest.fixture(scope='module')
+def messages():
+    return Messages(state_types=TYPES)
+
+
+def io_message(messages, on: bool):
+    types = messages.store.types
+    valve = types['cell_msgs/msg/Valve']
+    return types[IO](
+        np.array([7, 0, 3, 5 if on else 0], np.int32), 23.8 if on else 0.4, 1 if on else 0,
+        [valve(False, 0.0, 'off'), valve(on, 3.1 if on else np.nan, 'needle')],
+    )  # fmt: skip
+
+
+@pytest.fixture(scope='module')
+def bag(messages, tmp_path_factory):
+    """The pass, and the cell's signals at every pose, logged as the pose is stamped."""
+    types = messages.store.types
+    entries = pose_entries(PASS)
+    for stamp, on in zip(PASS.stamps_ns.tolist(), ON.tolist(), strict=True):
+        brush = types['cell_msgs/msg/Stamped'](messages.header(stamp), 2 if on else 0)
+        entries += [
+            ('/io', stamp, io_message(messages, on)),
+            ('/brush', stamp + 7_000_000_000, brush),
+            ('/valve/pressure', stamp, types['std_msgs/msg/Float64'](3.0 if on else 0.0)),
+            ('/closed', stamp, types['std_msgs/msg/Int32'](0 if on else 1)),
+        ]
+    folder = tmp_path_factory.mktemp('cell') / 'run'
+    return write_bag(folder, entries, 'sqlite3', messages)
+
+
+def openings(trajectory) -> np.ndarray:
+    """The flow at each pose."""
+    rows = np.searchsorted(trajectory.trigger_stamps_ns, PASS.stamps_ns, side='right') - 1
+    return trajectory.trigger_flow[rows] > 0.0
+
+
+@pytest.mark.parametrize(
+    ('trigger', 'said'),
+    [
+        ('/io.states[3]', 'trigger /io.states[3] is 0 to 5: the gun is on where it is above 0'),
+        ('/io.level > 12', 'trigger /io.level is 0.4 to 23.8: the gun is on where it is above 12'),
+        ('/io.valves[1].open', 'trigger /io.valves[1].open is 0 to 1'),
+        ('/valve/pressure', 'trigger /valve/pressure is 0 to 3'),
+        ('/closed < 1', 'the gun is on where it is below 1'),
+    ],
+)
+def test_a_number_in_any_field_opens_the_gun(trigger, said, bag):
+    read = read_recording(bag, None, trigger)
+    assert np.array_equal(openings(read), ON)
+    (note,) = read.notes
+    assert said in note
+
+
+def test_values_that_are_no_number_are_left_out_and_counted(bag):
+    read = read_recording(bag, state_topic='/io.valves[1].pressure_bar')
+    assert len(read.trigger_flow) == ON.sum()
+    assert '20 values that are no number are left out' in read.notes[0]
+
+
+@pytest.mark.parametrize(
+    ('trigger', 'words'),
+    [
+        ('/io', 'is cell_msgs/msg/Io; name one of its fields: /io.states[0] /io.states[1]'),
+        ('/io.state[3]', "no number or Bool at .state[3]; did you mean '/io.states[3]'?"),
+        ('/io.valves[1].label', 'no number or Bool at .valves[1].label'),
+        ('/oi.word', 'has no topic /oi.word'),
+        ('/io.level > 1e', "'1e' is no number"),
+    ],
+)
+def test_a_field_that_is_not_there_is_refused_with_those_there_are(trigger, words, bag):
+    with pytest.raises(RecordingError) as refused:
+        read_recording(bag, state_topic=trigger)
+    assert words in str(refused.value)
+
+
+def test_the_run_of_a_part_keeps_the_order_in_which_its_states_came(tmp_path):
+    stamps = PASS.stamps_ns[[0, 10]]
+    told = replace(PASS, trigger_stamps_ns=stamps, trigger_flow=np.array([0.5, 1.0]))
+    for custom_data, rows in ({'serial': '1'}, [0, 10]), ({}, []):
+        bag = write_pose_bag(tmp_path / f'run_{len(rows)}', told, custom_data)
+        read = read_recording(bag, state_topic='/atomizer/state')
+        assert read.trigger_stamps_ns.tolist() == stamps.tolist()
+        assert read.trigger_rows.tolist() == rows
+
+
+BELL = [0.0, 0.02, 0.31, *Rotation.from_euler('y', 0.3).as_quat()]
+RAIL = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]
+
+
+def tf_bag(path, storage='mcap'):
+    """A rail that carries an arm with a bell: world -> rail -> tool0 -> bell.
+
+    The rail goes evenly at 0.1 m/s and is published at 5 Hz, the arm at 50 Hz, the bell is static.
+    """
+    messages = Messages(ros1=storage == 'ros1')
+    positions, quaternions = tip_poses(sweep())
+    stamps = stamps_ns(TIMES_S)
+    entries = [('/tf_static', stamps[0], messages.transforms((0, 'tool0', 'bell', BELL)))]
+    for row, stamp in enumerate(stamps.tolist()):
+        pose = (stamp, 'rail', '/tool0', [*positions[row], *quaternions[row]])
+        rail = (stamp, 'world', 'rail', [0.1 * TIMES_S[row], *RAIL[1:]])
+        rows = [pose, rail] if row % 10 == 0 else [pose]
+        entries.append(('/tf', stamp, messages.transforms(*rows)))
+    return write_bag(path, entries, storage, messages)
+
+
+def expected_poses():
+    """Of the bell in the world."""
+    positions, quaternions = tip_poses(sweep())
+    bell, turn = Rigid.of(BELL), Rotation.from_quat(quaternions)
+    at = positions + turn.apply(bell.translation_m) + [0, 0, 0.1]
+    at[:, 0] += 0.1 * TIMES_S
+    return at, (turn * Rotation.from_quat(bell.quaternion_xyzw)).as_quat()
+
+
+def test_the_bell_in_the_world_is_the_product_along_the_tree(tmp_path):
+    bag = tf_bag(tmp_path / 'run.bag', 'ros1')
+    read = read_recording(bag, tf=['world', 'bell'], frame_id='world')
+    positions, quaternions = expected_poses()
+    assert np.array_equal(read.stamps_ns, stamps_ns(TIMES_S))
+    assert np.allclose(read.positions_m, positions, atol=1e-6)
+    apart = Rotation.from_quat(quaternions).inv() * Rotation.from_quat(read.quaternions_xyzw)
+    assert apart.magnitude().max() < 1e-6
+    (note,) = read.notes
+    assert "pose of 'bell' in 'world', 151 poses" in note
+    assert 'interpolated over up to 0.2 s' in note
+
+
+@pytest.mark.parametrize(
+    ('frames', 'words'),
+    [
+        (['world', 'bel'], "no frame 'bel' in its transforms; did you mean 'bell'?"),
+        (['tool0', 'bell'], "'bell' does not move in 'tool0'"),
+    ],
+)
+def test_frames_that_are_not_there_or_do_not_move_are_refused(frames, words, tmp_path):
+    with pytest.raises(RecordingError) as refused:
+        read_recording(tf_bag(tmp_path / 'run'), tf=frames)
+    assert words in str(refused.value)

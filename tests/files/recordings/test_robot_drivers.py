@@ -2,17 +2,18 @@
 
 import re
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from files.recorded import Messages, write_bag
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.motion_files import read_recording
-from paint_deposition.files.recordings.pose_topics import summarise
+from paint_deposition.files.recordings.bag_files import open_bag
+from paint_deposition.files.recordings.pose_topics import sources_of_poses
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
-from paint_deposition.motion.trajectory import Trajectory
-from robot_arm import JOINTS, sweep, tip_poses, urdf
+from robot_arm import sweep, tip_poses
 from scenes import stamps_ns
 
 TIMES_S = np.linspace(0.0, 3.0, 751)
@@ -21,31 +22,9 @@ SWEEP = sweep(len(TIMES_S))
 POSITIONS, QUATERNIONS = tip_poses(SWEEP)
 RAIL_M = np.linspace(0.0, 0.6, len(TIMES_S))
 ABB_JOINTS = [f'joint_{k}' for k in range(1, 7)]
+# The arm with ABB's names of joints, and with the rail that it may stand on.
+ROBOTS = Path(__file__).with_name('robots')
 LAG_NS = 12_000_000
-
-
-def abb_urdf(rail: bool) -> str:
-    """The arm with ABB's names of joints, and with the rail that it may stand on."""
-    text = urdf()
-    for name, its in zip(JOINTS, ABB_JOINTS, strict=True):
-        text = text.replace(f'<joint name="{name}"', f'<joint name="{its}"')
-    if rail:
-        text = text.replace('<parent link="base_link"/>', '<parent link="sledge"/>')
-        text = text.replace(
-            '</robot>',
-            '<link name="sledge"/><joint name="rail" type="prismatic"><parent link="base_link"/>'
-            '<child link="sledge"/><axis xyz="0 1 0"/>'
-            '<limit lower="0" upper="5" effort="1" velocity="1"/></joint></robot>',
-        )
-    return text
-
-
-@pytest.fixture(scope='module')
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp('drivers')
-    (made / 'arm.urdf').write_text(abb_urdf(rail=False))
-    (made / 'railed.urdf').write_text(abb_urdf(rail=True))
-    return made
 
 
 def joints(topic, names, values, every=1, times=1):
@@ -162,11 +141,11 @@ DRIVERS = {
 
 
 @pytest.mark.parametrize('driver', DRIVERS)
-def test_each_driver_gives_the_motion_of_the_arm(driver, folder, tmp_path):
+def test_each_driver_gives_the_motion_of_the_arm(driver, tmp_path):
     streams, given, words = DRIVERS[driver]
     log = streams(tmp_path / 'log.csv') if callable(streams) else bag(tmp_path / 'log', *streams)
-    options = {k: str(folder / f'{v}.urdf') if k == 'urdf' else v for k, v in given.items()}
-    read = read_recording(log, **options)
+    options = {k: str(ROBOTS / f'{v}.urdf') if k == 'urdf' else v for k, v in given.items()}
+    read = pd.read_recording(log, **options)
     assert len(read) == len(TIMES_S) - ('rail' in driver and len(TIMES_S) % 2 == 0)
     moved = POSITIONS + [0.0, 1.0, 0.0] * RAIL_M[:, None] if 'rail' in driver else POSITIONS
     assert np.allclose(read.positions_m, moved, atol=1e-7)
@@ -177,7 +156,7 @@ def test_each_driver_gives_the_motion_of_the_arm(driver, folder, tmp_path):
     if words:
         options.popitem()
         with pytest.raises(RecordingError, match=words.replace('[', r'\[')):
-            read_recording(log, **options)
+            pd.read_recording(log, **options)
 
 
 @pytest.mark.parametrize(
@@ -194,9 +173,9 @@ def test_each_driver_gives_the_motion_of_the_arm(driver, folder, tmp_path):
         (MILLIMETRES, '/arm_PoseStamped: its positions reach 1277 .* give --pose-unit mm'),
     ],
 )
-def test_what_was_taken_in_silence_is_told(stream, words, folder, tmp_path):
-    given = {} if stream is MILLIMETRES else {'urdf': str(folder / 'arm.urdf')}
-    read = read_recording(bag(tmp_path / 'run', stream), **given)
+def test_what_was_taken_in_silence_is_told(stream, words, tmp_path):
+    given = {} if stream is MILLIMETRES else {'urdf': str(ROBOTS / 'arm.urdf')}
+    read = pd.read_recording(bag(tmp_path / 'run', stream), **given)
     (told,) = (line for line in read.warnings if line.startswith(('/rws: ', '/arm_')))
     assert re.match(words, told)
 
@@ -205,7 +184,7 @@ def test_repeated_poses_leave_the_speed_of_the_gun_and_the_same_path_live():
     """Two and three times in turns, as of a loop that asks more often than the robot answers."""
     kept = np.cumsum(np.arange(len(TIMES_S)) % 5 % 2 == 0) - 1
     rows = np.searchsorted(kept, kept)
-    path, counts = spray_path(Trajectory(STAMPS, POSITIONS[rows], QUATERNIONS[rows]))
+    path, counts = spray_path(pd.Trajectory(STAMPS, POSITIONS[rows], QUATERNIONS[rows]))
     assert counts.repeated_samples > 0.3 * len(TIMES_S)
     late = path.time_s > 0.5
     speed = np.linalg.norm(path.velocity_m_per_s, axis=1)[late]
@@ -220,13 +199,14 @@ def test_repeated_poses_leave_the_speed_of_the_gun_and_the_same_path_live():
     assert np.array_equal(again.position_m, path.position_m)
 
 
-def test_inspect_says_of_each_source_whether_it_will_do_and_how(folder, tmp_path):
+def test_inspect_says_of_each_source_whether_it_will_do_and_how(tmp_path):
     run = bag(
         tmp_path / 'run', MILLIMETRES, DEGREES, poses('/odom', 'Odometry'),
         poses('/poses', 'PoseArray'), joints('/slow', ABB_JOINTS, SWEEP, every=50),
         joints('/twice', ABB_JOINTS, SWEEP, times=2),
     )  # fmt: skip
-    found = {source.topic: source for source in summarise(run, 0.25)[1]}
+    with open_bag(run) as opened:
+        found = {source.topic: source for source in sources_of_poses(opened, 0.25)}
     assert {topic: source.unit for topic, source in found.items()} == {
         '/arm_PoseStamped': 'mm', '/arm_JointState': 'deg', '/odom': 'm', '/poses': '',
         '/slow': 'rad', '/twice': 'rad',
@@ -240,7 +220,7 @@ def test_inspect_says_of_each_source_whether_it_will_do_and_how(folder, tmp_path
     assert (found['/arm_PoseStamped'].frame_id, found['/odom'].frame_id) == ('', 'base_link')
     for source in found.values():
         if source.quality:
-            words = shlex.split(source.options.replace('ROBOT', str(folder / 'arm.urdf')))
+            words = shlex.split(source.options.replace('ROBOT', str(ROBOTS / 'arm.urdf')))
             options = {k[2:].replace('-', '_'): v for k, v in zip(*[iter(words)] * 2, strict=True)}
-            ends = read_recording(run, **options).positions_m[[0, -1]]
+            ends = pd.read_recording(run, **options).positions_m[[0, -1]]
             assert np.allclose(ends, POSITIONS[[0, -1]], atol=2e-3)

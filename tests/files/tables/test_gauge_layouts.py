@@ -4,6 +4,8 @@ The layouts follow what the makers' manuals and programs show: lines about the b
 units in its headings or in a column of its own, and the statistics of the batch below it.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -14,89 +16,10 @@ from paint_deposition.part.surface import Surface
 from surfaces import triangulated
 from workbook import open_document, open_row, write_workbook
 
+LAYOUTS = Path(__file__).with_name('layouts')
 POINTS_M = np.array([[0.1, 0.0, 0.05], [0.1, 0.0, 0.2], [0.25, 0.0, 0.35]])
 
-# Unit in a column of its own; time of each reading; statistics behind their names.
-ELCOMETER = """Batch Name:,DOOR LH 17
-Gauge:,Elcometer 456
-Probe:,"Scale 1, F"
-Date:,12/03/2026
-
-Reading No.,Point,X (mm),Y (mm),Z (mm),Reading,Units,Date,Time,Notes
-1,A1,100,0,50,21.5,µm,12/03/2026,08:15:02,
-2,A1,100,0,50,22.1,µm,12/03/2026,08:15:07,
-3,A2,100,0,200,24.0,µm,12/03/2026,08:15:30,"left, near hinge"
-4,A3,250,0,350,,µm,12/03/2026,08:15:41,lift off
-5,A3,250,0,350,19.4,µm,12/03/2026,08:15:44,
-
-Statistics
-Number of Readings,4
-Mean,21.75,µm
-Standard Deviation,1.87,µm
-Coefficient of Variation,8.6,%
-Lowest Reading,19.4,µm
-Highest Reading,24.0,µm
-"""
-
-# German Windows: cp1252, tabs, decimal comma, blocks of repeats side by side.
-FISCHER = (
-    'FISCHER DataCenter\r\n'
-    'Applikation:\tLack/Stahl 7\r\n'
-    'Datum:\t12.03.2026\r\n'
-    'Messstelle\tX [mm]\tY [mm]\tZ [mm]\tSchichtdicke 1 [µm]\tSchichtdicke 2 [µm]\r\n'
-    'A1\t100,0\t0,0\t50,0\t21,5\t22,1\r\n'
-    'A2\t100,0\t0,0\t200,0\t24,0\t----\r\n'
-    'A3\t250,0\t0,0\t350,0\t19,4\t\r\n'
-    '\r\n'
-    'n =\t\t\t\t4\r\n'
-    'Mittelwert\t\t\t\t21,75\r\n'
-    'Std.-Abw.\t\t\t\t1,87\r\n'
-    'Variationskoeff.\t\t\t\t8,6\r\n'
-    'Min\t\t\t\t19,4\r\n'
-    'Max\t\t\t\t24,0\r\n'
-)  # fmt: skip
-
-# Summary before the readings; unit of all in a line of its own; label of a point in the notes.
-POSITECTOR = """"PosiSoft Desktop"
-"Batch Name","B1"
-"Probe Type","6000 FS1"
-"Units","mils"
-"Summary"
-"Average","0.856"
-"Std. Dev.","0.074"
-"Minimum","0.764"
-"Maximum","0.945"
-"Count","4"
-
-"#","Thickness","Date","Time","Point"
-"1","0.8465","3/12/2026","8:15 AM","A1"
-"2","0.8701","3/12/2026","8:15 AM","A1"
-"3","0.9449","3/12/2026","8:16 AM","A2"
-"4","0.7638","3/12/2026","8:16 AM","A3"
-"""
-POINTS = 'Name;X;Y;Z;Bemerkung\nA1;100,0;0,0;50,0;\nA2;100,0;0,0;200,0;\nA3;250,0;0,0;350,0;\n'
-
-# A measuring robot's list: aligned by blanks, nominal and measured places, the normal.
-ROBOT = """ROBOT CELL 4 / PART 1187-L
-POINT     X_NOM     Y_NOM     Z_NOM    X_ACT     Y_ACT     Z_ACT      DFT
-A1      100.000     0.000    50.000   100.000     0.000    50.000    21.50
-A1      100.000     0.000    50.000   100.000     0.000    50.000    22.10
-A2      100.000     0.000   200.000   100.000     0.000   200.000    24.00
-A3      250.000     0.000   350.000   250.000     0.000   350.000    19.40
-END OF LIST
-"""
-
-
-@pytest.fixture
-def file(tmp_path):
-    """`file(name, text)`: the path of a new file."""
-
-    def write(name: str, text: str, encoding: str = 'utf-8'):
-        path = tmp_path / name
-        path.write_bytes(text.encode(encoding))
-        return path
-
-    return write
+POINTS = (LAYOUTS / 'points.csv').read_text()
 
 
 def require_the_four_readings(readings, within_um=1e-9):
@@ -106,40 +29,31 @@ def require_the_four_readings(readings, within_um=1e-9):
     assert readings.positions_m == pytest.approx(POINTS_M[[0, 0, 1, 2]], abs=1e-12)
 
 
+# Files in `layouts/`, and what is said of each: a unit in a column of its own and statistics
+# behind their names; German Windows, with repeats side by side; the summary before the readings
+# and labels of points in the notes; a robot's list aligned by blanks, nominal places and measured.
 MAKERS = {
-    'Elcometer': (
-        ELCOMETER, 'utf-8-sig',
-        "a.txt: 4 readings, commas, UTF-8; x, y, z in mm, thickness in µm from 'Reading'; left "
-        'out: 1 row without a reading, 7 rows of statistics',
-    ),
-    'Fischer': (
-        FISCHER, 'cp1252', 'tabs, cp1252, decimal comma; x, y, z in mm, thickness in µm from',
-    ),
-    'PosiTector': (
-        POSITECTOR, 'utf-8',
-        'of 3 points in points.csv (semicolons, UTF-8, decimal comma), joined by '
-        "'Point', thickness in mil from 'Thickness'",
-    ),
-    'measuring robot': (
-        ROBOT, 'utf-16', 'blanks, UTF-16; x, y, z in mm (no unit is given; the largest is 350), '
-        "thickness in µm (no unit is given) from 'DFT'",
-    ),
+    'elcometer': "elcometer.txt: 4 readings, commas, UTF-8; x, y, z in mm, thickness in µm from "
+    "'Reading'; left out: 1 row without a reading, 7 rows of statistics",
+    'fischer': 'tabs, cp1252, decimal comma; x, y, z in mm, thickness in µm from',
+    'positector': 'of 3 points in points.csv (semicolons, UTF-8, decimal comma), joined by '
+    "'Point', thickness in mil from 'Thickness'",
+    'robot': 'blanks, UTF-16; x, y, z in mm (no unit is given; the largest is 350), '
+    "thickness in µm (no unit is given) from 'DFT'",
 }  # fmt: skip
 
 
 @pytest.mark.parametrize('maker', MAKERS)
-def test_layouts_of_makers(file, maker):
-    text, encoding, words = MAKERS[maker]
-    points = file('points.csv', POINTS) if maker == 'PosiTector' else None
-    readings = read_readings(file('a.txt', text, encoding), points)
+def test_layouts_of_makers(maker):
+    points = LAYOUTS / 'points.csv' if maker == 'positector' else None
+    readings = read_readings(LAYOUTS / f'{maker}.txt', points)
     require_the_four_readings(readings, 2e-3 if points else 1e-9)
-    assert words in readings.understood
+    assert MAKERS[maker] in readings.understood
 
 
-def test_predictions_are_written_beside_the_columns_of_the_file(file):
-    path = file('panel.txt', FISCHER, 'cp1252')
-    written = path.with_name('predicted.csv')
-    write_predictions(written, read_readings(path), np.array([1.0, 1.0, 2.0, 3.0]))
+def test_predictions_are_written_beside_the_columns_of_the_file(tmp_path):
+    written, readings = tmp_path / 'predicted.csv', read_readings(LAYOUTS / 'fischer.txt')
+    write_predictions(written, readings, np.array([1.0, 1.0, 2.0, 3.0]))
     lines = written.read_text().splitlines()
     assert lines[1] == 'A1,"100,0","0,0","50,0","21,5","22,1",1.0000'
     assert len(lines) == 4
@@ -148,15 +62,12 @@ def test_predictions_are_written_beside_the_columns_of_the_file(file):
 def test_spreadsheet(tmp_path):
     """Title rows, numbers as numbers and as text with a comma, a second sheet without readings."""
     rows = [
-        ['Türaußenhaut, Los 17'],
-        [],
+        ['Türaußenhaut, Los 17'], [],
         [None, 'Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke (µm)', 'i.O.?'],
-        [None, 'A1', 100, 0, 50, 21.5, 'ja'],
-        [None, 'A1', 100, 0, 50, '22,1', 'ja'],
-        [None, 'A2', 100, 0, 200, 24, 'ja'],
-        [None, 'A3', 250, 0, 350, '19,4', 'nein'],
+        [None, 'A1', 100, 0, 50, 21.5, 'ja'], [None, 'A1', 100, 0, 50, '22,1', 'ja'],
+        [None, 'A2', 100, 0, 200, 24, 'ja'], [None, 'A3', 250, 0, 350, '19,4', 'nein'],
         [None, 'Mittelwert', None, None, None, 21.75],
-    ]
+    ]  # fmt: skip
     path = tmp_path / 'tuer.xlsx'
     write_workbook(path, {'Deckblatt': [['Kunde', 'Werk 3']], 'Messung': rows})
     readings = read_readings(path)
@@ -173,11 +84,9 @@ def test_open_document_whose_empty_rest_is_said_to_repeat(tmp_path):
     """As LibreOffice writes it: empty cells and rows to the end of the sheet."""
     rows = [
         ('Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke [µm]'),
-        ('A1', 100.0, 0.0, 50.0, 21.5),
-        ('A1', 100.0, 0.0, 50.0, 22.1),
-        ('A2', 100.0, 0.0, 200.0, 24.0),
-        ('A3', 250.0, 0.0, 350.0, 19.4),
-    ]
+        ('A1', 100.0, 0.0, 50.0, 21.5), ('A1', 100.0, 0.0, 50.0, 22.1),
+        ('A2', 100.0, 0.0, 200.0, 24.0), ('A3', 250.0, 0.0, 350.0, 19.4),
+    ]  # fmt: skip
     rest = open_row(rows=1_048_571, empty=16_384)
     path = tmp_path / 'tuer.ods'
     path.write_bytes(open_document(''.join(open_row(*row, empty=16_379) for row in rows) + rest))
@@ -384,69 +293,6 @@ def test_labels_of_listed_points_are_no_statistics(file):
     assert readings.point.tolist() == ['N', 'S', 'X']
 
 
-# What else shops have: each is read as these readings, or refused with the reason.
-PLACED = 'Punkt;X [mm];Y [mm];Z [mm];Dicke [µm]\nA1;100,0;0;50;21,5\nA2;100,0;0;200;22,1\n'
-SHEET = ['Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Dicke [µm]']
-ELCOMASTER = (
-    'ElcoMaster 2.0\r\nBatch,Door 17\r\nUnits,mils\r\n\r\nReading #,Thickness,Date\r\n'
-    '1,0.85,12/03/2026\r\n2,0.87,12/03/2026\r\n\r\nStatistics\r\nNumber Of Readings,2\r\n'
-    'Mean,0.86\r\nCoef. of Variation,1.2%\r\nHigh Limit,2\r\n'
-)
-IN_CELLS = {
-    'units below, a title above': [
-        ['Schichtdicke Tür'], ['Messpunkt', 'X', 'Y', 'Z', 'Dicke'],
-        [None, 'mm', 'mm', 'mm', 'µm'],
-        ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, '22,1'],
-    ],
-    'statistics without labels': [
-        SHEET, ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, 22.1], [], [None] * 4 + [21.8],
-    ],
-}  # fmt: skip
-REFUSED_CELLS = {
-    'stands over several columns or is a title': [[*SHEET, None], ['A1', 100, 0, 50, 21.5, 22]],
-    "'12.5' beside it in line 3 has no heading": [
-        ['Dicke', None, None], ['Ort', 'Basis', 'Klar'], ['A1', 12.5, 21.5],
-    ],
-    "line 3: Dicke .* is '#DIV/0!'; expected .* or n/a where": [
-        SHEET, ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, '#DIV/0!'],
-    ],
-    "line 3: X .* is ''": [SHEET, ['A1', 100, 0, 50, 21.5], [None] * 4 + [21.5]],
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ('text', 'encoding'),
-    [
-        (PLACED, 'utf-8-sig'), (PLACED, 'utf-16'), (PLACED, 'latin-1'),
-        ('sep=;\n' + PLACED, 'utf-8'),
-        (PLACED.replace('\n', '\r'), 'utf-8'),
-        (PLACED.replace(' [mm]', '').replace(' [µm]', '').replace('\n', '\n;mm;mm;mm;mil\n', 1)
-         .replace('21,5', '0,84646').replace('22,1', '0,87008'), 'utf-8'),
-        (PLACED.replace(' [µm]', '').replace('\n', '\n-;mm;mm;mm;Mikrometer\n', 1), 'utf-8'),
-    ],
-)  # fmt: skip
-def test_encodings_and_units_below_headings(file, text, encoding):
-    require_two(read_readings(file('a.csv', text, encoding)))
-
-
-def require_two(readings):
-    assert readings.thickness_um == pytest.approx([21.5, 22.1], abs=1e-3)
-    assert readings.positions_m.tolist() == [[0.1, 0.0, 0.05], [0.1, 0.0, 0.2]]
-    assert readings.point.tolist() == ['A1', 'A2']
-
-
-@pytest.mark.parametrize('rows', IN_CELLS.values(), ids=IN_CELLS)
-def test_what_stands_around_a_table_of_a_workbook(tmp_path, rows):
-    require_two(read_readings(write_workbook(tmp_path / 'a.xlsx', {'S': rows})))
-
-
-@pytest.mark.parametrize('message', REFUSED_CELLS)
-def test_cells_that_could_mislead_are_refused(tmp_path, message):
-    path = write_workbook(tmp_path / 'a.xlsx', {'S': REFUSED_CELLS[message]})
-    with pytest.raises(ReadingsError, match=message):
-        read_readings(path)
-
-
 @pytest.mark.parametrize(
     ('text', 'columns', 'message'),
     [
@@ -480,7 +326,7 @@ def test_tables_without_places_that_could_mislead_are_refused(file, text, column
 
 def test_the_limits_below_an_export_are_no_readings(file):
     listed = 'no,x_m,y_m,z_m\n1,0.1,0,0.05\n2,0.1,0,0.2\n'
-    readings = read_readings(file('a.csv', ELCOMASTER, 'utf-8-sig'), file('p.csv', listed))
+    readings = read_readings(LAYOUTS / 'elcomaster.csv', file('p.csv', listed))
     assert readings.thickness_um == pytest.approx([21.59, 22.098])
     assert '5 rows of statistics' in readings.understood
 

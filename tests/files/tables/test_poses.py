@@ -1,5 +1,7 @@
 """Tables of poses as robots and loggers write them: one motion in many layouts."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,108 +11,26 @@ from paint_deposition.files.motion_files import read_recording
 from workbook import write_workbook
 
 # A gun that sways while it goes, and is on in the middle.
-TIMES_S = np.array([0.0, 0.02, 0.041, 0.06, 0.0805])
-POSITIONS_M = np.array(
-    [
-        [1.2, -0.25, 0.9],
-        [1.21, -0.251, 0.9],
-        [1.22, -0.25, 0.91],
-        [1.232, -0.25, 0.9],
-        [1.24, 0, 1],
-    ]
-)
+POSITIONS_M = np.array([
+    [1.2, -0.25, 0.9], [1.21, -0.251, 0.9], [1.22, -0.25, 0.91], [1.232, -0.25, 0.9], [1.24, 0, 1],
+])  # fmt: skip
 TURNS = Rotation.from_euler(
     'ZYX', [[10, -20, 170], [12, -18, 175], [15, -15, 179], [20, -10, 170], [25, 5, 160]], True
 )
 ON = [0, 1, 1, 0, 0]
 
 
-def table(headings: str, *columns, separator: str = ',', decimal: str = '.') -> str:
-    """The text of a table of these columns, each (N,) or (N, C)."""
-    rows = np.column_stack(columns)
-    lines = [separator.join(f'{value:.9f}'.replace('.', decimal) for value in row) for row in rows]
-    return '\n'.join([headings, *lines]) + '\n'
-
-
-def quaternions(order: str = 'xyzw') -> np.ndarray:
-    return TURNS.as_quat()[:, ['xyzw'.index(letter) for letter in order]]
-
-
-def degrees(sequence: str) -> np.ndarray:
-    return TURNS.as_euler(sequence, degrees=True)
-
-
-LAYOUTS = {
-    'plain': (table('t,x,y,z,qx,qy,qz,qw', TIMES_S, POSITIONS_M, quaternions()), {}),
-    'German, millimetres': (
-        table(
-            'Zeit [ms];X [mm];Y [mm];Z [mm];A [deg];B [deg];C [deg]', 1e3 * TIMES_S,
-            1e3 * POSITIONS_M, degrees('ZYX'), separator=';', decimal=',',
-        ), {},
-    ),
-    'German words': (
-        table(
-            'Zeit (Sekunden);X (ist) [mm];Y (ist) [mm];Z (ist) [mm];A (Grad);B (Grad);C (Grad)',
-            TIMES_S, 1e3 * POSITIONS_M, degrees('ZYX'), separator=';', decimal=',',
-        ), {},
-    ),
-    'KUKA without units': (
-        table('time_s,X,Y,Z,A,B,C', TIMES_S, 1e3 * POSITIONS_M, degrees('ZYX')),
-        {'pose_unit': 'mm'},
-    ),
-    'Fanuc': (
-        table('time (s)\tX (mm)\tY (mm)\tZ (mm)\tW (deg)\tP (deg)\tR (deg)', TIMES_S,
-              1e3 * POSITIONS_M, degrees('xyz'), separator='\t'), {},
-    ),
-    'ABB quaternion': (
-        table('time_s,x_mm,y_mm,z_mm,q1,q2,q3,q4', TIMES_S, 1e3 * POSITIONS_M,
-              quaternions('wxyz')), {},
-    ),
-    'rotation vector': (
-        table('timestamp,TCP_x,TCP_y,TCP_z,TCP_rx,TCP_ry,TCP_rz', TIMES_S, POSITIONS_M,
-              TURNS.as_rotvec()), {},
-    ),
-    'rotation vector in degrees': (
-        table('t,x,y,z,rx [deg],ry [deg],rz [deg]', TIMES_S, POSITIONS_M,
-              np.degrees(TURNS.as_rotvec())), {'rotation': 'rotvec'},
-    ),
-    'roll pitch yaw': (
-        table('t,x,y,z,roll,pitch,yaw', TIMES_S, POSITIONS_M, np.radians(degrees('xyz'))), {},
-    ),
-    'named axes, a convention that takes z first': (
-        table('t,x,y,z,rx_deg,ry_deg,rz_deg', TIMES_S, POSITIONS_M, degrees('ZYX')[:, ::-1]),
-        {'rotation': 'ZYX'},
-    ),
-    'Kawasaki': (
-        table('time_s,x,y,z,O,A,T', TIMES_S, POSITIONS_M, degrees('ZYZ')),
-        {'rotation': 'kawasaki'},
-    ),
-    'a logger of messages': (
-        table(
-            '__time,/gun/pose/position/x,/gun/pose/position/y,/gun/pose/position/z,'
-            '/gun/pose/orientation/x,/gun/pose/orientation/y,/gun/pose/orientation/z,'
-            '/gun/pose/orientation/w', TIMES_S, POSITIONS_M, quaternions(),
-        ), {},
-    ),
-    'units below the headings, titles above': (
-        'Robot 7; booth 2\nProgram: DOOR_LH;V2\n' + table(
-            'Zeit;X;Y;Z;A;B;C\nms;mm;mm;mm;°;°;°', 1e3 * TIMES_S, 1e3 * POSITIONS_M,
-            degrees('ZYX'), separator=';', decimal=',',
-        ), {},
-    ),
-    'NumPy': (table('# t,x,y,z,qx,qy,qz,qw', TIMES_S, POSITIONS_M, quaternions()), {}),
-    'comments and blank lines': (
-        '# robot 3, shift 2\n\n' + table('t,x,y,z,qx,qy,qz,qw', TIMES_S, POSITIONS_M,
-                                         quaternions()).replace('\n', '\n\n'), {},
-    ),
+# What must be said to read a file of `poses/`, each of which has the motion in another layout.
+LAYOUTS = Path(__file__).with_name('poses')
+SAID = {
+    'kuka': {'pose_unit': 'mm'}, 'rotation_vector_deg': {'rotation': 'rotvec'},
+    'z_first': {'rotation': 'ZYX'}, 'kawasaki': {'rotation': 'kawasaki'},
 }  # fmt: skip
 
 
-@pytest.mark.parametrize('name', LAYOUTS)
-def test_every_layout_is_the_same_motion(name, tmp_path):
-    text, options = LAYOUTS[name]
-    (tmp_path / 'poses.csv').write_text(text, encoding='utf-8-sig')
-    read = read_recording(tmp_path / 'poses.csv', **options)
+@pytest.mark.parametrize('path', sorted(LAYOUTS.iterdir()), ids=lambda path: path.stem)
+def test_every_layout_is_the_same_motion(path):
+    read = read_recording(path, **SAID.get(path.stem, {}))
     assert np.array_equal(read.stamps_ns, [0, 20_000_000, 41_000_000, 60_000_000, 80_500_000])
     assert np.allclose(read.positions_m, POSITIONS_M, atol=1e-9)
     turned_by = (TURNS.inv() * Rotation.from_quat(read.quaternions_xyzw)).magnitude()
@@ -128,8 +48,9 @@ def test_every_layout_is_the_same_motion(name, tmp_path):
     ],
 )  # fmt: skip
 def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
-    columns = TIMES_S, POSITIONS_M, quaternions(), flows
-    (tmp_path / 'poses.csv').write_text(table(f't,x,y,z,qx,qy,qz,qw,{heading}', *columns))
+    head, *rows = (LAYOUTS / 'plain.csv').read_text(encoding='utf-8-sig').splitlines()
+    lines = (f'{row},{flow}' for row, flow in zip(rows, flows, strict=True))
+    (tmp_path / 'poses.csv').write_text('\n'.join([f'{head},{heading}', *lines]))
     read = read_recording(tmp_path / 'poses.csv', **options)
     assert np.array_equal(read.trigger_stamps_ns, read.stamps_ns)
     assert np.allclose(read.trigger_flow, flows)
@@ -137,9 +58,8 @@ def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
 
 
 @pytest.mark.parametrize('axis', ['x', 'y', 'z', '-x', '-y', '-z'])
-def test_the_tool_may_spray_along_another_of_its_axes(axis, tmp_path):
-    (tmp_path / 'poses.csv').write_text(LAYOUTS['plain'][0])
-    read = read_recording(tmp_path / 'poses.csv', tool_axis=axis)
+def test_the_tool_may_spray_along_another_of_its_axes(axis):
+    read = read_recording(LAYOUTS / 'plain.csv', tool_axis=axis)
     sprays = Rotation.from_quat(read.quaternions_xyzw).as_matrix()[:, :, 2]
     column = TURNS.as_matrix()[:, :, 'xyz'.index(axis[-1])]
     assert sprays == pytest.approx(-column if axis[0] == '-' else column, abs=1e-6)
@@ -223,9 +143,8 @@ def test_a_program_that_is_not_read_says_what_to_export(suffix, rotation, tmp_pa
         read_recording(tmp_path / f'door{suffix}')
 
 
-def test_options_of_other_kinds_of_files_are_refused(tmp_path):
-    (tmp_path / 'poses.csv').write_text(LAYOUTS['plain'][0])
+def test_options_of_other_kinds_of_files_are_refused():
     with pytest.raises(RecordingError, match='--pose-topic is for bags'):
-        read_recording(tmp_path / 'poses.csv', '/pose')
+        read_recording(LAYOUTS / 'plain.csv', '/pose')
     with pytest.raises(RecordingError, match="rotation: 'zxq' is no convention; give 'rotvec'"):
-        read_recording(tmp_path / 'poses.csv', rotation='zxq')
+        read_recording(LAYOUTS / 'plain.csv', rotation='zxq')

@@ -10,13 +10,8 @@ from scipy.stats import multivariate_normal
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.inference.design import next_experiment
 from paint_deposition.inference.design.contenders import Forecast, Placement, contenders_of
-from paint_deposition.inference.design.next_experiment import (
-    EDGE_MARGIN_M,
-    SPACING_M,
-    propose,
-    with_proposals,
-)
 from paint_deposition.inference.design.sprays import MENU, together
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, Step, Unknown
@@ -56,7 +51,9 @@ def drift_or_tool(drifting, fit):
     """Drifting air, or a tool that is off its point: what says which."""
     found = drifting.fit(FreeParameters.of(fit.model))
     group = EffectClass(('air_drift', 'tcp_offset'), 0.9, 'air_drift')
-    return propose(drifting, contenders_of(diagnosed(drifting, found, group), EFFECTS))
+    return next_experiment.propose(
+        drifting, contenders_of(diagnosed(drifting, found, group), EFFECTS)
+    )
 
 
 @pytest.mark.slow
@@ -91,9 +88,9 @@ def test_places_lie_on_the_surface_apart_and_off_the_edge(study, fit, drift_or_t
     surface = study.campaign.experiments[0].surface
     at = surface.at(positions)
     assert at.positions_m == pytest.approx(positions, abs=1e-9)
-    assert (at.edge_distance_m > EDGE_MARGIN_M).all()
+    assert (at.edge_distance_m > next_experiment.EDGE_MARGIN_M).all()
     apart = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2)
-    assert (apart + np.eye(len(places)) > SPACING_M).all()
+    assert (apart + np.eye(len(places)) > next_experiment.SPACING_M).all()
     assert 'air_drift' in places[0].why
     told = places[0].to_dict()
     assert [told[axis] for axis in ('x_m', 'y_m', 'z_m')] == positions[0].tolist()
@@ -161,7 +158,7 @@ def test_all_of_the_leading_group_compete_and_the_shapeless_cause_where_it_does(
     settled = diagnosed(study, fit, alone, other, accepted=('air_drift',))
     for diagnosis in (diagnosed(study, fit), settled):
         assert contenders_of(diagnosis, EFFECTS) == ()
-        assert with_proposals(diagnosis, EFFECTS).proposals == ((), ())
+        assert next_experiment.with_proposals(diagnosis, EFFECTS).proposals == ((), ())
     assert contenders_of(diagnosed(study, fit, group), {}) == ()
 
 
@@ -207,11 +204,9 @@ def test_the_log_odds_are_those_of_readings_that_are_drawn():
 def test_nothing_tells_between_explanations_that_say_the_same():
     told = forecast()
     same = replace(
-        told,
-        log_weight=np.zeros(3),
-        means=np.tile(told.means[0], (3, 1)),
+        told, log_weight=np.zeros(3), means=np.tile(told.means[0], (3, 1)),
         factors=np.tile(told.factors[0], (3, 1, 1)),
-    )
+    )  # fmt: skip
     assert same.separations == pytest.approx((0.0, 0.0), abs=1e-6)
     assert same.chance == 0.0
 

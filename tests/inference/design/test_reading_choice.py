@@ -1,4 +1,4 @@
-"""Points for the gauge: the design beside exact figures, and what it is worth on a part."""
+"""Points for the gauge, and a gun that stands still before one of them."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, ncx2
 
+import paint_deposition as pd
 from booth import MODEL, panel, path_of, serpentine
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ReadingsError
@@ -16,9 +17,12 @@ from paint_deposition.inference.design.reading_choice import (
     design_at,
     power,
 )
+from paint_deposition.inference.design.sprays import MENU
 from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.model_space import SIZES
-from paint_deposition.part.gauge_places import grid_places
+from paint_deposition.inference.diagnosis.proposals import Spray, StationarySpray, spots, suits
+from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.readings.gauge_places import grid_places
 
 
 def on_panel(*names: str) -> UnmeasuredPart:
@@ -108,3 +112,72 @@ def test_a_part_without_paint_is_refused():
 def test_impossible_wishes_are_refused(count, repeats, words):
     with pytest.raises(ReadingsError, match=words):
         choose(on_panel('flow_drift'), count, repeats, foot_m=0.6 if count == 300 else 0.015)
+
+
+BELL = pd.DepositionModel()
+MOST_UM = 25.0
+BY_KEY = {change.key: change for change in MENU}
+
+
+@pytest.fixture(scope='module')
+def sample_panel(sample):
+    return sample.experiments[0]
+
+
+def stand(sample_panel, **more) -> StationarySpray:
+    return StationarySpray.before(sample_panel, spots(sample_panel, 1)[0], BELL, MOST_UM, **more)
+
+
+def film_um(sample_panel, one, model=BELL):
+    return Forward(pd.Campaign((one.sprayed(sample_panel),)), model.effects).predict_um(model)
+
+
+def test_the_gun_stands_square_before_a_spot_at_the_distance_of_the_passes(sample_panel):
+    one = stand(sample_panel)
+    path = one.sprayed(sample_panel).path
+    assert path.rotation[:, :, 2] == pytest.approx(np.tile(-one.normal, (len(path), 1)), abs=1e-9)
+    away = path.position_m - one.position_m
+    assert np.linalg.norm(away, axis=1) == pytest.approx(one.standoff_m, abs=1e-9)
+    assert path.spraying_time_s == pytest.approx(one.dwell_s, abs=1e-9)
+    assert path.speed_m_per_s.max() == 0.0
+    # The tool is turned about its axis as it was on the passes.
+    assert one.across @ sample_panel.path.rotation[0, :, 0] > 0.99
+
+
+def test_the_film_stays_within_the_one_given_and_comes_near_it(sample_panel):
+    one = stand(sample_panel)
+    film = film_um(sample_panel, one)
+    assert 0.7 * MOST_UM < film.max() <= one.peak_um <= MOST_UM
+    half = film_um(sample_panel, replace(one, dwell_s=0.5 * one.dwell_s))
+    assert half == pytest.approx(0.5 * film, rel=1e-9)
+    closer = StationarySpray.before(
+        BY_KEY['closer'].made(sample_panel), spots(sample_panel, 1)[0], BELL, MOST_UM
+    )
+    assert closer.dwell_s < one.dwell_s
+    assert 0.7 * MOST_UM < film_um(sample_panel, closer).max() <= MOST_UM
+    # Half a second is needed: the trigger is not quick enough for less film.
+    assert StationarySpray.before(sample_panel, spots(sample_panel, 1)[0], BELL, 0.1) is None
+
+
+@pytest.mark.parametrize('name', ['corner_slowdown', 'gun_wake', 'pose_lag'])
+def test_effects_of_motion_do_not_show(sample_panel, name):
+    effect = EFFECTS[name].typical()
+    model = BELL.model_copy(update={'effects': (effect,)})
+    passes = Forward(pd.Campaign((sample_panel,)), (effect,))
+    assert np.abs(passes.predict_um(model) - passes.predict_um(BELL)).max() > 1e-4
+    one = stand(sample_panel)
+    assert film_um(sample_panel, one, model) == pytest.approx(film_um(sample_panel, one), abs=1e-9)
+
+
+def test_effects_of_a_whole_job_do_not_suit_a_spot():
+    assert suits(BELL, {'lateral shift', 'curvature'})
+    assert not suits(BELL, {'lateral shift', 'order'})
+    fog = BELL.model_copy(update={'effects': (EFFECTS['overspray_fog'].typical(),)})
+    assert not suits(fog, {'lateral shift'})
+
+
+def test_a_film_that_may_sag_is_told():
+    thick = Spray('the same passes at twice the flow', ('a', 'b'), 4.0, 1.0, peak_um=60.0,
+                  peak_now_um=30.0)  # fmt: skip
+    assert thick.film_words == 'the film will reach 60 µm, now 30: see that it does not sag'
+    assert replace(thick, peak_um=33.0).film_words == ''

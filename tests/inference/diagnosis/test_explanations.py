@@ -1,4 +1,4 @@
-"""What may be missing, and by how much the laws of effects that act may be off."""
+"""What may be missing, how far laws may be off, and closed forms of learned curves."""
 
 from dataclasses import replace
 
@@ -9,19 +9,9 @@ from booth import MODEL
 from inference.diagnosis.linear import linear_fit
 from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a_back, study_of
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.inference.diagnosis.explanations import (
-    LAW_ERROR,
-    OTHER_ERROR,
-    OTHER_LAW,
-    UNKNOWN,
-    law_errors,
-    neutral_shapes,
-    nonparametric_laws_of,
-    of_effects,
-    of_footprint,
-    ways_off,
-)
+from paint_deposition.effects.catalogue import EFFECTS, LEARNED
+from paint_deposition.inference.diagnosis import explanations
+from paint_deposition.inference.diagnosis.closed_forms import fitting_forms, forms_of
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 
@@ -34,7 +24,7 @@ def study() -> Study:
 
 
 def errors(
-    study: Study, *effects: Effect, kept: tuple[str, ...] | None = None, of=law_errors
+    study: Study, *effects: Effect, kept: tuple[str, ...] | None = None, of=explanations.law_errors
 ) -> np.ndarray:
     """(P, n) of a model with these effects, of which all or some are kept."""
     model = MODEL.model_copy(update={'effects': effects})
@@ -51,7 +41,7 @@ def change_um(study: Study, effect: Effect) -> np.ndarray:
 
 def another_form(*laws) -> np.ndarray:
     """(P, n) the last of the ways in which laws may be off."""
-    return ways_off(*laws)[-1][0]
+    return explanations.ways_off(*laws)[-1][0]
 
 
 def size(columns: np.ndarray) -> np.ndarray:
@@ -72,15 +62,15 @@ def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(stud
     """Over the conditions that the effect names, over all others, and of a law of another form."""
     effect = EFFECTS[name](**values)
     share = np.abs(change_um(study, effect)) / study.sigma_um
-    expected = np.hypot(LAW_ERROR, OTHER_ERROR) * share
+    expected = np.hypot(explanations.LAW_ERROR, explanations.OTHER_ERROR) * share
     assert size(errors(study, effect)) == pytest.approx(expected, rel=0.03)
     other_form = size(errors(study, effect, of=another_form))
-    assert other_form == pytest.approx(OTHER_LAW * share, rel=0.03)
+    assert other_form == pytest.approx(explanations.OTHER_LAW * share, rel=0.03)
 
 
 @pytest.mark.parametrize('effect', [e for e in EFFECTS.values() if e.exact], ids=lambda e: e.id)
 def test_geometry_and_gauge_have_no_law_that_could_be_off(study, effect):
-    for of in (law_errors, another_form):
+    for of in (explanations.law_errors, another_form):
         assert errors(study, effect.typical(), of=of).shape == (len(study), 0)
     assert errors(study, effect.typical(), EDGE).shape == errors(study, EDGE).shape
 
@@ -89,11 +79,11 @@ def test_a_law_that_may_have_any_form_is_off_by_a_share_of_its_largest_effect(st
     """Where it does least as much as where it does most: the law itself may be elsewhere."""
     change = change_um(study, EDGE)
     relative = change / study.forward.predict_um(MODEL.with_effect(EDGE))
-    over_others = OTHER_ERROR * change / study.sigma_um
+    over_others = explanations.OTHER_ERROR * change / study.sigma_um
     own = np.sqrt(size(errors(study, EDGE)) ** 2 - (0.97 * over_others) ** 2)
     found = own * study.sigma_um / study.forward.predict_um(MODEL)
-    assert found.max() < 1.2 * LAW_ERROR * np.abs(relative).max()
-    assert found.min() > 0.5 * LAW_ERROR * np.quantile(np.abs(relative), 0.95)
+    assert found.max() < 1.2 * explanations.LAW_ERROR * np.abs(relative).max()
+    assert found.min() > 0.5 * explanations.LAW_ERROR * np.quantile(np.abs(relative), 0.95)
 
 
 def test_errors_of_several_effects_are_independent(study):
@@ -124,10 +114,13 @@ def test_where_an_effect_was_switched_off_or_no_paint_lands_its_law_has_no_error
 def test_laws_of_any_form_leave_the_film_as_a_whole_as_it_is(study):
     """How much paint there is in all is the pattern's."""
     fit = study.fit(FreeParameters.of(MODEL))
-    for found in (nonparametric_laws_of(study, MODEL), of_footprint(study, fit)):
+    for found in (
+        explanations.nonparametric_laws_of(study, MODEL),
+        explanations.of_footprint(study, fit),
+    ):
         assert sum(explanation.share for explanation in found) == pytest.approx(1.0)
         for explanation in found:
-            assert explanation.cause == UNKNOWN
+            assert explanation.cause == explanations.UNKNOWN
             assert explanation.learns not in ('', 'film_um')
             film_um = explanation.columns * study.sigma_um[:, np.newaxis]
             assert np.abs(film_um.sum(axis=0)).max() < 1e-9 * np.abs(film_um).sum()
@@ -142,11 +135,96 @@ def test_what_the_model_has_is_not_looked_for():
     study = study_of(on_panel())
     fit = replace(linear_fit(np.random.default_rng(0), len(study)), model=MODEL.with_effect(EDGE))
     others = ('corner_slowdown', 'fog_gradient')
-    candidates = {name: neutral_shapes(EFFECTS[name]) for name in ('edge_build', *others)}
-    found = list(of_effects(study, fit, candidates))
+    candidates = {
+        name: explanations.neutral_shapes(EFFECTS[name]) for name in ('edge_build', *others)
+    }
+    found = list(explanations.of_effects(study, fit, candidates))
     assert {explanation.cause for explanation in found} == set(others)
     for cause in others:
         own = [explanation for explanation in found if explanation.cause == cause]
         assert len(own) == len(candidates[cause])
         assert sum(explanation.share for explanation in own) == pytest.approx(1.0)
         assert all(e.columns is e.law.columns and e.learns == '' for e in own)
+
+
+KNOTS = 14
+STANDOFF = np.linspace(0.5, 2.0, KNOTS)
+COSINE = np.linspace(0.1, 1.0, KNOTS)
+TIME_S = np.linspace(0.0, 40.0, KNOTS)
+
+
+@pytest.mark.parametrize(
+    ('form', 'x', 'unit', 'curve', 'expected'),
+    [
+        ('linear', TIME_S, 's', lambda t: 1.1 * (1 + 0.02 * (t - 20)),
+         {'level': 1.1, 'slope_per_s': 0.02}),
+        ('quadratic', TIME_S, 's', lambda t: 1 + 0.01 * (t - 20) - 0.0006 * (t - 20) ** 2,
+         {'level': 1.0, 'slope_per_s': 0.01, 'bend_per_s2': -0.0006}),
+        ('power', STANDOFF, '1', lambda r: 0.9 * r**-0.5, {'level': 0.9, 'exponent': -0.5}),
+        ('power', COSINE, '1', lambda c: 1.2 * c**0.4, {'level': 1.2, 'exponent': 0.4}),
+        ('inverse', STANDOFF, '1', lambda r: 0.4 + 0.6 / r, {'level': 1.0, 'share': 0.6}),
+        ('exponential', STANDOFF, '1', lambda r: np.exp(0.7 * (r - 1)),
+         {'level': 1.0, 'rate': 0.7}),
+        ('saturating', TIME_S, 's', lambda t: 0.8 * (1 + 0.5 * (1 - np.exp(-t / 6))),
+         {'level': 0.8, 'change': 0.5, 'scale_s': 6.0}),
+        ('logistic', TIME_S, 's', lambda t: 0.9 * (1 + 0.4 / (1 + np.exp((15 - t) / 2.5))),
+         {'level': 0.9, 'change': 0.4, 'middle_s': 15.0, 'width_s': 2.5}),
+    ],
+    ids=lambda value: value if isinstance(value, str) else '',
+)  # fmt: skip
+def test_a_curve_made_from_a_form_is_named_with_its_parameters(form, x, unit, curve, expected):
+    sd = np.full(KNOTS, 0.004)
+    held = []
+    for seed in range(4):
+        noise = np.random.default_rng(seed).normal(0.0, sd)
+        best, *others = fitting_forms(x, curve(x) + noise, sd, unit=unit)
+        held.append(best.name == form)
+        found = next(one for one in (best, *others) if one.name == form)
+        assert set(found.parameters) == set(expected)
+        for name, value in expected.items():
+            at = found.parameters[name]
+            assert at.low < at.value < at.high
+            assert at.value == pytest.approx(value, abs=1.3 * (at.high - at.low))
+        assert found(x) == pytest.approx(curve(x), abs=0.015)
+        probabilities = [one.probability for one in (best, *others)]
+        assert probabilities == sorted(probabilities, reverse=True)
+        assert sum(probabilities) < 1.0 + 1e-9
+    assert sum(held) >= 3
+
+
+def test_an_addition_is_in_micrometres():
+    x, sd = np.linspace(0.0, 0.2, KNOTS), np.full(KNOTS, 0.05)
+    best = fitting_forms(x, 6.0 * np.exp(-x / 0.05), sd, unit='m', addition=True)[0]
+    assert best.name in ('exponential', 'saturating')
+    assert best.formula.startswith('addition [um] = ')
+    assert 'level_um' in best.parameters
+
+
+@pytest.mark.parametrize(
+    ('change', 'sd'),
+    [
+        (0.1 * np.sin(TIME_S / 2.5), 0.02),
+        (0.3 * np.sin(TIME_S / 2.5), 0.02),
+        (0.003 * np.random.default_rng(1).normal(size=KNOTS), 0.02),
+    ],
+    ids=['wavy', 'very wavy', 'flat'],
+)
+def test_a_wiggly_or_flat_curve_has_none(change, sd):
+    assert fitting_forms(TIME_S, 1.0 + change, np.full(KNOTS, sd), unit='s') == ()
+
+
+def test_a_wide_band_leaves_several_forms_and_says_so():
+    forms = fitting_forms(STANDOFF, STANDOFF**-0.5, np.full(KNOTS, 0.04))
+    assert len(forms) > 3
+    assert forms[0].probability < 0.9
+    for form in forms:
+        assert np.abs(form(STANDOFF) - STANDOFF**-0.5).max() < 2 * 0.04
+
+
+def test_a_learned_law_over_incidence_is_a_power_of_the_cosine():
+    law = LEARNED['incidence_deg'](low=0.0, high=70.0, learned=(0.0,) * KNOTS)
+    values = tuple((-law.knots) ** 0.6 - 1.0)
+    best = forms_of(law.model_copy(update={'learned': values, 'sd': (0.005,) * KNOTS}))[0]
+    assert best.formula == 'factor = level * cos_incidence^exponent'
+    assert best.parameters['exponent'].value == pytest.approx(0.6, abs=0.02)
+    assert forms_of(law.model_copy(update={'learned': values})) == ()  # how well known?

@@ -77,12 +77,9 @@ def shifted(null: NullModel, change: np.ndarray) -> NullModel:
 
 
 def space_of(
-    plain: NullModel,
-    found: list[Explanation],
-    discrepancy: ModelDiscrepancy,
-    *sizes: DiscrepancyHyperparameters,
-    freedom: float = np.inf,
-) -> ModelSpace:
+    plain: NullModel, found: list[Explanation], discrepancy: ModelDiscrepancy,
+    *sizes: DiscrepancyHyperparameters, freedom: float = np.inf,
+) -> ModelSpace:  # fmt: skip
     weighed = [WeightedNull.of(plain, discrepancy, one, freedom) for one in sizes or (SMALL,)]
     return ModelSpace(weighed, found, discrepancy, freedom)
 

@@ -11,15 +11,8 @@ import paint_deposition as pd
 from inference.diagnosis.readings_on_door import at_model
 from inference.fitting.panels import gauged
 from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.inference.diagnosis import model_space
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN
-from paint_deposition.inference.diagnosis.model_space import (
-    COARSENED,
-    PRIOR_EFFECT,
-    PRIOR_UNKNOWN,
-    SIZES,
-    SURE,
-    log_odds,
-)
 from paint_deposition.inference.diagnosis.search import ALIKE, SAME, Search, SearchStage
 from paint_deposition.inference.diagnosis.state import DiagnosisState
 
@@ -84,14 +77,14 @@ def test_effects_are_fitted_beside_what_nature_leaves_over(stages):
     best = stages[-1].here
     assert best.fit.discrepancy is not None
     # What is usual is not their prior: both are stronger.
-    assert best.fit.parameters.amplitude_sizes == dict.fromkeys(PLANTED, SIZES[-1])
+    assert best.fit.parameters.amplitude_sizes == dict.fromkeys(PLANTED, model_space.SIZES[-1])
     assert best.effects['edge_build'].gain == pytest.approx(EDGE.gain, rel=0.2)
     drift = best.effects['flow_drift'].drift_per_pass
     assert drift == pytest.approx(DRIFT.drift_per_pass, rel=0.2)
     # The size is one of several that were possible before.
-    assert best.log_prior == pytest.approx(2.0 * log_odds(PRIOR_EFFECT))
+    assert best.log_prior == pytest.approx(2.0 * model_space.log_odds(model_space.PRIOR_EFFECT))
     weights = [one.log_weight for one in best.weighed if not one.sizes.is_beyond_nature]
-    assert -2.0 * np.log(len(SIZES)) < best.log_evidence - logsumexp(weights) < 0.0
+    assert -2.0 * np.log(len(model_space.SIZES)) < best.log_evidence - logsumexp(weights) < 0.0
     # One size of the discrepancy bears nearly all the weight of this set.
     everything = np.ones(len(best.state.study), dtype=bool)
     assert best.log_weight_of(everything) == pytest.approx(best.log_weight, abs=1.5)
@@ -107,18 +100,21 @@ def test_each_effect_of_the_set_is_sure_and_one_that_does_not_stand_is_taken_out
         assert trial.names == groups.keys() == {*PLANTED}
     for name, (members, probability) in groups.items():
         assert members == (name,)
-        assert probability > SURE
+        assert probability > model_space.SURE
         # Against the set without it, as it is or with something unknown beside it. The other
         # effect is accepted: the evidence counts for less, the prior does not.
         others = search.without(trial, name)
         rivals = dict.fromkeys((name, *others.proposed))
-        effect, unknown = log_odds(PRIOR_EFFECT), log_odds(PRIOR_UNKNOWN)
+        effect, unknown = (
+            model_space.log_odds(model_space.PRIOR_EFFECT),
+            model_space.log_odds(model_space.PRIOR_UNKNOWN),
+        )
         gains = [search.with_effect(others, rival).log_evidence for rival in rivals]
-        odds = (np.array(gains) - others.log_evidence) / COARSENED + effect
+        odds = (np.array(gains) - others.log_evidence) / model_space.COARSENED + effect
         gain = others.of_unknown.alone[UNKNOWN] - unknown
         # What is unknown may also look just like them.
         alike = logsumexp(odds) + np.log(ALIKE)
-        shares = softmax([*odds, 0.0, gain / COARSENED + unknown, alike])
+        shares = softmax([*odds, 0.0, gain / model_space.COARSENED + unknown, alike])
         assert probability == pytest.approx(shares[:-3].sum())
 
 
@@ -128,7 +124,7 @@ def test_effects_that_look_alike_share_one_group():
     ((name, (members, probability)),) = groups.items()
     assert trial.names == {name}
     assert set(members) == {'edge_build', 'twin'}
-    assert probability > SURE
+    assert probability > model_space.SURE
 
 
 def test_nothing_is_added_where_nothing_acts(clean):

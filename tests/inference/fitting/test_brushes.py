@@ -20,7 +20,6 @@ from paint_deposition.inference.fitting.posterior import of_brushes, with_brushe
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PATTERN, Brush, PlanarPattern
-from paint_deposition.report.writers.write import write
 
 PHI_RAD = 0.1
 FIRST = PlanarPattern(
@@ -122,7 +121,7 @@ def test_panels_of_two_brushes_give_both_patterns_and_transfer_efficiencies_back
 
 @pytest.mark.slow
 def test_the_written_model_has_all_brushes_that_were_given(calibrated, tmp_path):
-    write(calibrated, tmp_path / 'two', start=ModelFile(TRUTH))
+    pd.write(calibrated, tmp_path / 'two', start=ModelFile(TRUTH))
     again = read_model_file(tmp_path / 'two/model.yaml')
     assert [b.number for b in again.model.brushes] == [1, 4]
     assert again.posterior is not None
@@ -130,7 +129,7 @@ def test_the_written_model_has_all_brushes_that_were_given(calibrated, tmp_path)
     # A brush that was not painted with stays as it was given.
     third = Brush(number=7, planar=FIRST, flow_cm3_per_min=250.0, bell_speed_rpm=3e4, solids=0.45)
     start = ModelFile(pd.DepositionModel.of_brushes([*TRUTH.brushes, third]))
-    files = write(calibrated, tmp_path / 'three', start=start)
+    files = pd.write(calibrated, tmp_path / 'three', start=start)
     assert json.loads(files[1].read_text())['brushes']['by_number'].keys() == {'1', '4'}
     kept = read_model_file(files[0])
     assert kept.model.brushes[-1] == third

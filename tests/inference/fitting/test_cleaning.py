@@ -10,12 +10,7 @@ from inference.fitting.panels import ORDERS, column, grid_m, painted_by, passes,
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.state import trouble_with
-from paint_deposition.inference.fitting.cleaning import (
-    CELLS,
-    cells_by_part,
-    clean_and_fit,
-    condensed,
-)
+from paint_deposition.inference.fitting import cleaning
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.outliers import (
     FittedPoints,
@@ -157,7 +152,9 @@ def test_a_thick_film_without_texture_is_no_broken_fit():
     film = even.readings.thickness_um * 80.0 / even.readings.thickness_um.mean()
     readings = film + 0.5 * np.random.default_rng(8).normal(size=len(film))
     stated = pd.Readings.of(at, readings, sigma_um=np.full(len(film), 0.5))
-    study, fit = clean_and_fit(pd.Campaign((even.with_readings(stated),)), MODEL, starts=1)
+    study, fit = cleaning.clean_and_fit(
+        pd.Campaign((even.with_readings(stated),)), MODEL, starts=1
+    )
     assert trouble_with(study, fit) == ''
     assert study.texture.source == 'neighbours'
     assert study.texture.share < 0.004
@@ -166,7 +163,7 @@ def test_a_thick_film_without_texture_is_no_broken_fit():
 
 def test_an_assumed_noise_leaves_the_texture_assumed():
     experiment = painted_by(MODEL, passes([0.55, 1.35]), grid_m(), repeats=1)
-    study, _ = clean_and_fit(pd.Campaign((experiment,)), MODEL, starts=1)
+    study, _ = cleaning.clean_and_fit(pd.Campaign((experiment,)), MODEL, starts=1)
     assert (study.texture.share, study.texture.source) == (0.01, 'assumed')
 
 
@@ -185,8 +182,8 @@ def scan() -> pd.Campaign:
 def test_the_mean_of_a_cell_is_the_film_at_its_middle_within_the_noise_of_a_mean(scan):
     # Off by a tenth of the film, as a rough fit may be.
     planar = MODEL.planar.model_copy(update={'K1_cm3_per_s': 1.1 * MODEL.planar.K1_cm3_per_s})
-    cells = condensed(scan, MODEL.model_copy(update={'planar': planar}))
-    assert 0.8 * CELLS < len(cells) <= CELLS
+    cells = cleaning.condensed(scan, MODEL.model_copy(update={'planar': planar}))
+    assert 0.8 * cleaning.CELLS < len(cells) <= cleaning.CELLS
     sigma_um = cells.readings.sigma_um
     expected_um = NOISE_UM / np.sqrt(SCANNED / len(cells))
     assert np.median(sigma_um) == pytest.approx(expected_um, rel=0.1)
@@ -214,4 +211,4 @@ def test_a_few_readings_by_hand_beside_a_scan_are_kept_and_what_became_of_it_is_
      ([60] * 12, [25] * 12), ([2] * 400, [1] * 400)],
 )  # fmt: skip
 def test_parts_share_the_cells_evenly(points, cells):
-    assert cells_by_part(points) == cells
+    assert cleaning.cells_by_part(points) == cells

@@ -13,7 +13,7 @@ from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.messages import stamp_ns
-from robot_arm import JOINTS, sweep, urdf
+from robot_arm import JOINTS, URDF, sweep
 
 
 @pytest.mark.parametrize('rate', [0.0, 20.0])
@@ -51,7 +51,6 @@ def test_a_bag_without_poses_is_replayed(kind, play, listen, wait_until, tmp_pat
     """From transforms or joint states of a robot, with the trigger, as `paint simulate` does."""
     messages, entries = Messages(), []
     stamps_ns = START_NS + 20_000_000 * np.arange(40)
-    (tmp_path / 'arm.urdf').write_text(urdf())
     for stamp, joints in zip(stamps_ns.tolist(), sweep(40), strict=True):
         if kind == 'urdf':
             moved = '/joint_states', stamp + 100, messages.joints(stamp, JOINTS, joints)
@@ -64,7 +63,7 @@ def test_a_bag_without_poses_is_replayed(kind, play, listen, wait_until, tmp_pat
     remedy = 'give tf: TARGET SOURCE' if kind == 'tf' else 'give urdf'
     with pytest.raises(RecordingError, match=remedy):
         play(bag)
-    given = {'tf': ['base', 'tool0']} if kind == 'tf' else {'urdf': str(tmp_path / 'arm.urdf')}
+    given = {'tf': ['base', 'tool0']} if kind == 'tf' else {'urdf': str(URDF)}
     listener = listen()
     player = play(bag, rate=0.0, state_topic='/gun', **given)
     wait_until(player.finished.done, what='the end of the replay')

@@ -11,11 +11,10 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, String
 
+import paint_deposition as pd
 from files.recorded import START_NS, straight_pass
 from nodes.bags.runs import counts, finish, messages, offered, pose
 from nodes.cell import FACING_PANEL, Robot, parameters
-from paint_deposition.errors import PaintError
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.pose_stream import TriggerChange
@@ -39,7 +38,7 @@ def test_every_byte_of_a_replay_is_recorded(play, record, wait_until, tmp_path):
     assert [m for m in messages(recorder.run.folder) if m[0] == '/atomizer/pose'] == [
         m for m in messages(bag) if m[0] == '/atomizer/pose'
     ]
-    again = read_recording(recorder.run.folder, None, '/atomizer/state')
+    again = pd.read_recording(recorder.run.folder, None, '/atomizer/state')
     for name in ('stamps_ns', 'positions_m', 'trigger_stamps_ns', 'trigger_flow'):
         np.testing.assert_array_equal(getattr(again, name), getattr(written, name))
 
@@ -132,7 +131,7 @@ def test_bad_input_is_reported_at_the_start(record):
         ({'output_directory': '/dev/null/runs'}, 'cannot create /dev/null/runs/run'),
         ({'topic': 'x'}, 'run_recorder has no parameter topic; did you mean'),
     ):
-        with pytest.raises(PaintError, match=says):
+        with pytest.raises(pd.PaintError, match=says):
             record(**values)
 
 
@@ -169,6 +168,6 @@ def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == 2, what='its own')
     recorder.close()
     for run, poses in (('run', range(10)), ('1', range(10, 12))):
-        motion = read_recording(tmp_path / run, state_topic='/atomizer/state')
+        motion = pd.read_recording(tmp_path / run, state_topic='/atomizer/state')
         assert motion.stamps_ns.tolist() == [START_NS + k for k in poses]
         assert motion.trigger_flow.tolist() == [0.5]

@@ -16,15 +16,11 @@ from paint_msgs.srv import ChangePart
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import TransitionCallbackReturn
 
+import paint_deposition as pd
 from brushes import two_brushes
 from nodes.cell import PANEL_M, offline_um, parameters, two_passes, write_panel
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.model_file import write_model
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.model.eq1_pattern import Brush
-from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import ERROR, OK
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
@@ -33,7 +29,7 @@ LATER_NS = 60_000_000_000
 SERVICE = '/deposition_simulator/change_part'
 
 
-def closed_at_its_end(motion: Trajectory) -> Trajectory:
+def closed_at_its_end(motion: pd.Trajectory) -> pd.Trajectory:
     """The gun is off when the part leaves."""
     return replace(
         motion,
@@ -42,7 +38,7 @@ def closed_at_its_end(motion: Trajectory) -> Trajectory:
     )
 
 
-def later(motion: Trajectory) -> Trajectory:
+def later(motion: pd.Trajectory) -> pd.Trajectory:
     return replace(
         motion,
         stamps_ns=motion.stamps_ns + LATER_NS,
@@ -69,7 +65,7 @@ def change(call, onlooker):
 def wider(tmp_path):
     """The mesh of another part."""
     path = write_panel(tmp_path / 'wider.stl')
-    mesh = read_mesh(path, max_edge_length_m=0.05)
+    mesh = pd.read_mesh(path, max_edge_length_m=0.05)
     trimesh.Trimesh(1.3 * mesh.vertices_m, mesh.faces).export(path)
     return str(path)
 
@@ -119,7 +115,7 @@ def test_each_part_has_its_film_and_its_run(
     node.close()
     for number, (motion, film) in enumerate(zip(motions, films, strict=True)):
         run = folder / f'47-{number}'
-        recorded = read_recording(run, None, '/atomizer/state')
+        recorded = pd.read_recording(run, None, '/atomizer/state')
         assert np.array_equal(recorded.stamps_ns, motion.stamps_ns)
         with open_bag(run) as bag:
             messages = {topic.name: topic.message_count for topic in bag.topics}
@@ -142,9 +138,9 @@ def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
 ):
     """Closed before the change it is closed after it, and it sprays on with its brush."""
     brushes = two_brushes()
-    write_model(tmp_path / 'brushes.yaml', brushes)
-    other = DepositionModel.of_brushes([Brush(number=1, planar=brushes.planar)])
-    write_model(tmp_path / 'other.yaml', other)
+    pd.write_model(tmp_path / 'brushes.yaml', brushes)
+    other = pd.DepositionModel.of_brushes([Brush(number=1, planar=brushes.planar)])
+    pd.write_model(tmp_path / 'other.yaml', other)
     node = simulator(model_file=str(tmp_path / 'brushes.yaml'), repaint=False)
     source = robot(node)
     source.send_state(WITHOUT_TRIGGER.stamps_ns[0], 1.0, brush=2)
@@ -309,7 +305,7 @@ def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot,
     """Poses that came while the next mesh was read are painted where the old part stands."""
     node = simulator(part_pose=pose, part_parent_frame='cell')
     large, broken = write_panel(tmp_path / 'large.stl'), tmp_path / 'broken.stl'
-    mesh = read_mesh(large, max_edge_length_m=0.005)
+    mesh = pd.read_mesh(large, max_edge_length_m=0.005)
     trimesh.Trimesh(mesh.vertices_m, mesh.faces).export(large)
     broken.write_text('no mesh')
     source = robot(node)
@@ -359,7 +355,7 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
     recorder.close()
     before = SimpleNamespace(points=points, surface=surface)
     for run, live, of in (('before', film, before), ('1', second, node)):
-        motion = read_recording(tmp_path / 'films' / run, state_topic='/atomizer/state')
+        motion = pd.read_recording(tmp_path / 'films' / run, state_topic='/atomizer/state')
         assert len(motion) == half
         assert np.array_equal(offline_um(of, motion), live)
     assert second.max() > 1.0
@@ -389,6 +385,8 @@ def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
     if placed:
         figures = json.loads(Path(answer.paths[2]).read_text())
         assert figures['poses']['received'] == len(MOTION)
+        saved = np.loadtxt(answer.paths[1], delimiter=',', skiprows=1)[:, 3]
+        assert saved == pytest.approx(offline_um(node, MOTION), rel=1e-7)
     else:
         assert not answer.paths
     assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))

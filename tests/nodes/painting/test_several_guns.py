@@ -7,22 +7,18 @@ import pytest
 from paint_msgs.msg import ThicknessField, ThicknessStats
 from scipy.spatial.transform import Rotation
 
+import paint_deposition as pd
 from nodes.cell import Robot, offline_um, two_passes
-from paint_deposition.api.simulation import simulate
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.sag import Sag
-from paint_deposition.errors import PaintError
-from paint_deposition.files.model_file import write_model
 from paint_deposition.files.motion_files import MotionSource, read_gun_motions
-from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.runtime import topics
 
 
-def moved(motion: Trajectory, by_m: list[float]) -> Trajectory:
+def moved(motion: pd.Trajectory, by_m: list[float]) -> pd.Trajectory:
     return replace(motion, positions_m=motion.positions_m + by_m)
 
 
-def from_behind(motion: Trajectory) -> Trajectory:
+def from_behind(motion: pd.Trajectory) -> pd.Trajectory:
     """The motion turned by half a turn about the vertical z."""
     half_turn = Rotation.from_euler('z', np.pi)
     turned = half_turn * Rotation.from_quat(motion.quaternions_xyzw)
@@ -34,7 +30,7 @@ def from_behind(motion: Trajectory) -> Trajectory:
 GUNS = ['robot_1', 'robot_2']
 HIGH = two_passes(poses=400)
 LOW = moved(two_passes(poses=320, trigger=False), [0.1, 0.0, -0.15])
-THIN = DepositionModel(planar={'K1_cm3_per_s': 1.0})
+THIN = pd.DepositionModel(planar={'K1_cm3_per_s': 1.0})
 
 
 @pytest.fixture
@@ -48,26 +44,6 @@ def guns(ros_context, spin, wait_until):
         return robots
 
     return guns
-
-
-def test_the_film_is_the_sum_of_the_guns_whoever_comes_first(simulator, guns, painted, tmp_path):
-    write_model(tmp_path / 'thin.yaml', THIN)
-    node = simulator(atomizers=GUNS, model_files=['', str(tmp_path / 'thin.yaml')])
-    first, second = guns(node)
-    expected = offline_um(node, HIGH) + offline_um(node, LOW, THIN)
-    alone = [offline_um(node, HIGH).max(), offline_um(node, LOW, THIN).max()]
-    assert min(alone) > 1.0
-    # One after the other.
-    first.send(HIGH)
-    second.send(LOW)
-    assert np.array_equal(painted(node, len(HIGH) + len(LOW)), expected)
-    # In turn, the second first.
-    node.reset()
-    for start in range(0, len(HIGH), 37):
-        second.send(LOW, slice(start, start + 37))
-        first.send(HIGH, slice(start, start + 37))
-        painted(node, min(start + 37, len(HIGH)) + min(start + 37, len(LOW)))
-    assert np.array_equal(painted(node, len(HIGH) + len(LOW)), expected)
 
 
 def test_each_guns_share_is_reported(simulator, guns, painted, onlooker, wait_until):
@@ -118,8 +94,8 @@ def test_the_first_gun_decides_which_side_is_outward(simulator, guns, painted, w
 
 def test_what_does_not_go_together_is_refused(simulator, tmp_path):
     thin, sagging = str(tmp_path / 'thin.yaml'), str(tmp_path / 'sagging.yaml')
-    write_model(tmp_path / 'thin.yaml', THIN)
-    write_model(tmp_path / 'sagging.yaml', THIN.with_effect(Sag.typical()))
+    pd.write_model(tmp_path / 'thin.yaml', THIN)
+    pd.write_model(tmp_path / 'sagging.yaml', THIN.with_effect(Sag.typical()))
     one_film = r'robot_1 and robot_2 differ in what acts on the finished film.*\(sag\)'
     for values, words in (
         ({'model_files': [thin]}, 'model_files names 1 models for 2 atomizers: give'),
@@ -131,26 +107,35 @@ def test_what_does_not_go_together_is_refused(simulator, tmp_path):
         ({'atomizers': ['robot_1', 'robot_1']}, r'atomizers is .*give different names'),
         ({'atomizers': ['../robot']}, r'atomizers is .*give different names'),
     ):
-        with pytest.raises(PaintError, match=words):
+        with pytest.raises(pd.PaintError, match=words):
             simulator(**{'atomizers': GUNS} | values)
 
 
-def test_a_run_of_two_guns_replayed_is_the_film_that_was_painted(
-    simulator, record, guns, wait_until, painted, play
+def test_the_film_is_the_sum_of_the_guns_whoever_comes_first_and_that_of_their_run_replayed(
+    simulator, record, guns, wait_until, painted, play, tmp_path
 ):
-    """Live, from one bag by a player for each gun, and offline: the same film to the last bit."""
+    """In turn, one after the other, from one bag by a player for each gun, and offline."""
+    pd.write_model(tmp_path / 'thin.yaml', THIN)
     low = moved(two_passes(poses=320), [0.1, 0.0, -0.15])
-    node, poses = simulator(atomizers=GUNS), len(HIGH) + len(low)
+    node = simulator(atomizers=GUNS, model_files=['', str(tmp_path / 'thin.yaml')])
+    poses = len(HIGH) + len(low)
     recorder, (first, second) = record(atomizers=GUNS), guns(node)
     wait_until(lambda: first.has_subscribers(2) and second.has_subscribers(2), what='discovery')
     for start in range(0, len(HIGH), 37):
         second.send(low, slice(start, start + 37))
         first.send(HIGH, slice(start, start + 37))
+        painted(node, min(start + 37, len(HIGH)) + min(start + 37, len(low)))
     live = painted(node, poses)
-    assert np.array_equal(live, offline_um(node, HIGH) + offline_um(node, low))
+    alone = offline_um(node, HIGH), offline_um(node, low, THIN)
+    assert min(film.max() for film in alone) > 1.0
+    assert np.array_equal(live, sum(alone))
     recorder.close()
     run = recorder.run.folder
 
+    node.reset()
+    first.send(HIGH)
+    second.send(low)
+    assert np.array_equal(painted(node, poses), live)
     node.reset()
     players = [
         play(
@@ -162,7 +147,7 @@ def test_a_run_of_two_guns_replayed_is_the_film_that_was_painted(
     wait_until(lambda: all(player.finished.done() for player in players), what='both replays')
     assert np.array_equal(painted(node, poses), live)
 
-    motions = [gun.trajectory for gun in read_gun_motions([run], MotionSource(), GUNS)]
-    film = simulate(node.surface, motions, names=GUNS)
+    motions = [motion for _, motion in read_gun_motions([run], MotionSource(), GUNS)]
+    film = pd.simulate(node.surface, motions, [pd.DepositionModel(), THIN], names=GUNS)
     assert film.film_um.max() == pytest.approx(live.max(), rel=1e-6)
     assert np.abs(film.film_um - live).max() < 1e-5 * live.max()

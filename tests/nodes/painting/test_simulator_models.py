@@ -5,20 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from brushes import switched, two_brushes
 from nodes.cell import offline_um, parameters, two_passes, write_own_model
 from paint_deposition.effects.catalogue import effect_class
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
-from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.model.eq1_pattern import Brush
 
 MOTION = two_passes()
 # One effect that acts on each ray, and one that needs whole strokes.
-MODEL = DepositionModel(
+MODEL = pd.DepositionModel(
     effects=tuple(effect_class(i).typical() for i in ('incidence_attraction', 'corner_slowdown'))
 )
-THIN = DepositionModel(planar={'K1_cm3_per_s': 0.19})
+THIN = pd.DepositionModel(planar={'K1_cm3_per_s': 0.19})
 BRUSHES = two_brushes()
 POSES = 'deposition_simulator: poses'
 
@@ -27,10 +26,10 @@ POSES = 'deposition_simulator: poses'
 def set_model(tmp_path):
     """`set_model(node, model)`: set it at run time; None is the default one."""
 
-    def set_model(node, model: DepositionModel | None) -> None:
+    def set_model(node, model: pd.DepositionModel | None) -> None:
         path = tmp_path / 'new.yaml'
         if model is not None:
-            write_model(path, model)
+            pd.write_model(path, model)
         changes = parameters(model_file=str(path) if model is not None else '')
         assert node.set_parameters(changes)[0].successful
 
@@ -39,7 +38,7 @@ def set_model(tmp_path):
 
 @pytest.fixture
 def node(simulator, tmp_path):
-    write_model(tmp_path / 'brushes.yaml', BRUSHES)
+    pd.write_model(tmp_path / 'brushes.yaml', BRUSHES)
     return simulator(model_file=str(tmp_path / 'brushes.yaml'))
 
 
@@ -87,7 +86,7 @@ def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
     (tmp_path / 'gate').touch()
     wait_until(lambda: not node.repainting, what='repainting')
     painted_anew = node.film.snapshot().film_um
-    assert np.array_equal(painted_anew, offline_um(node, MOTION, read_model(own)))
+    assert np.array_equal(painted_anew, offline_um(node, MOTION, pd.read_model(own)))
     # Within 45 degrees of the axis the factor is 1.35 to 1.5.
     assert 1.2 < painted_anew.max() / film.max() <= 1.5
 
@@ -180,8 +179,8 @@ def test_a_brush_that_is_not_in_the_model_is_refused_and_those_it_has_are_named(
     refusal = 'brush 4 is not in the model; its brushes: 1, 2'
     assert node.inputs[0].state_errors == {refusal}
     wait_until(lambda: viewer.reports(POSES, refusal, b'\x01'), what='the refusal')
-    other = DepositionModel.of_brushes([Brush(number=1, planar=BRUSHES.planar)])
-    write_model(tmp_path / 'other.yaml', other)
+    other = pd.DepositionModel.of_brushes([Brush(number=1, planar=BRUSHES.planar)])
+    pd.write_model(tmp_path / 'other.yaml', other)
     assert node.set_parameters(parameters(model_file=str(tmp_path / 'other.yaml')))[0].successful
     wait_until(lambda: not node.repainting, what='the end of the trial')
     assert 'brush 2 is not in the model; its brushes: 1' in node.model_problem

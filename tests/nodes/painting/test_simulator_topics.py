@@ -10,10 +10,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from nodes.cell import Robot, offline_um, two_passes
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.film.colour_scales import FILM_PALETTE
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.nodes.painting.film_display import STATS_FIELDS
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.report.colour_scales import FILM_PALETTE
 
 MOTION = two_passes()
 POSES = 'deposition_simulator: poses'

@@ -19,7 +19,7 @@ from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
 from paint_deposition.nodes.robot.robot_poses import JointPoses
 from paint_deposition.nodes.runtime.node import ERROR
-from robot_arm import JOINTS, tip_poses, urdf
+from robot_arm import JOINTS, URDF, tip_poses
 
 WAY = np.linspace([0.1, -0.2, 0.3, 0.0, 0.2, -0.1], [0.4, 0.1, 0.1, 0.3, -0.2, 0.5], 40)
 STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -68,11 +68,9 @@ def test_a_driver_that_returns_with_another_quality_of_service_is_heard(
 
 
 @pytest.fixture
-def source(start, tmp_path):
+def source(start):
     """`source(**parameters)`: the node, with the arm's URDF."""
-    (tmp_path / 'arm.urdf').write_text(urdf())
-    arm = {'urdf_file': str(tmp_path / 'arm.urdf')}
-    return lambda **values: start(AtomizerSource, **arm | values)
+    return lambda **values: start(AtomizerSource, **{'urdf_file': str(URDF)} | values)
 
 
 @pytest.fixture

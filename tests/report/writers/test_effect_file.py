@@ -1,17 +1,32 @@
-"""A learned law written as an effect: it loads, is absent at its defaults, and gives its film."""
+"""What is written: a learned law as an effect, fitted models, films."""
+
+import json
+import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from paint_deposition.effects.catalogue import LEARNED, load_effect_file
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.files.model_file import read_model
+from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.diagnosis import closed_forms
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
+from paint_deposition.inference.diagnosis.refit import refit
+from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.kernel.laws import Ray
-from paint_deposition.report.writers.inference import effect_entry, file_name, write_effect_file
+from paint_deposition.model.eq2_projection import Projection
+from paint_deposition.report.writers.inference import (
+    effect_entry,
+    file_name,
+    write_effect_file,
+    write_fitted,
+)
+from paint_deposition.report.writers.write import write_film
 from small_campaign import small_campaign
 
 KNOTS, SD = 12, 0.02
@@ -48,7 +63,7 @@ def door(tmp_path_factory):
     return small_campaign(folder, experiments=('door',)).experiments[0]
 
 
-def film_um(experiment, model: DepositionModel) -> np.ndarray:
+def film_um(experiment, model: pd.DepositionModel) -> np.ndarray:
     """What the gauge shows at the readings."""
     painted = FilmIntegrator(experiment.measured_points, model, 'double', parallel=False)
     painted.add(experiment.path)
@@ -84,21 +99,21 @@ def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(
     law = learned(covariate, shape, kind)
     forms = forms_of(law)
     assert forms
-    plain = film_um(door, DepositionModel())
+    plain = film_um(door, pd.DepositionModel())
     for number, form in enumerate(forms):
         file = write_effect_file(tmp_path / f'my_law_{number}.py', law, form)
         effect = load_effect_file(file)
         assert effect().is_neutral
-        assert film_um(door, DepositionModel(effects=(effect(),))) == pytest.approx(plain)
+        assert film_um(door, pd.DepositionModel(effects=(effect(),))) == pytest.approx(plain)
         entry = effect_entry(form, file.name)
         (tmp_path / 'model.yaml').write_text(f'effects: [{{{entry}}}]\n')
         assert entry in file.read_text().replace('"', '')
-        model = read_model(tmp_path / 'model.yaml')
+        model = pd.read_model(tmp_path / 'model.yaml')
         if law.flux_factor is not None:
             x = np.linspace(law.low, law.high, 200)
             assert np.abs(factor_at(*model.effects, x) - law.factor(x)).max() < 2.0 * SD
         if law.flux_factor is None or (number == 0 and (covariate, shape) in IN_KERNEL):
-            wanted = film_um(door, DepositionModel(effects=(law,)))
+            wanted = film_um(door, pd.DepositionModel(effects=(law,)))
             band = 2.0 * SD * (10.0 if kind == 'addition' else plain)
             # Rays beyond the range of the readings are few: there the law itself fades to neutral.
             assert np.mean(np.abs(film_um(door, model) - wanted) < band + 0.01) > 0.95
@@ -113,3 +128,74 @@ def test_the_name_of_an_effect_of_the_library_is_not_taken(tmp_path):
 def test_names_of_experiments_become_names_of_files():
     names = {'door': 'door', 'Tür 2/left': 'Tür_2_left', '../..': 'experiment'}
     assert {name: file_name(name) for name in names} == names
+
+
+@pytest.fixture
+def painted():
+    """A square metre with a ramp of film, and its statistics."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], dtype=float)
+    surface = pd.Surface.from_triangles(corners, np.array([[0, 1, 2], [0, 2, 3]]), 0.2)
+    film = 50.0 * surface.vertices_m[:, 0] / 3.0
+    stats = film_statistics(film, surface.vertex_areas_m2, 20.0)
+    return surface, film, stats
+
+
+def test_figures_of_any_kind_are_written(painted, tmp_path):
+    """Mesh and table are held against each other where `paint simulate` is tried out."""
+    surface, film, stats = painted
+    details = {'poses': np.int64(7), 'rate': math.inf}
+    *_, figures = write_film(tmp_path / 'new', surface, film, stats, details=details)
+    content = json.loads(figures.read_text())
+    assert (content['mean_um'], content['poses'], content['rate']) == (stats.mean_um, 7, None)
+
+
+def test_an_older_film_stays_unless_told(painted, tmp_path):
+    surface, film, stats = painted
+    csv = write_film(tmp_path, surface, film, stats)[1]
+    with pytest.raises(pd.PaintError, match=r'film\.ply is there already'):
+        write_film(tmp_path, surface, 2 * film, stats)
+    assert np.genfromtxt(csv, delimiter=',', skip_header=1)[:, 3].max() == pytest.approx(50 / 3)
+    write_film(tmp_path, surface, 2 * film, stats, overwrite=True)
+    assert np.genfromtxt(csv, delimiter=',', skip_header=1)[:, 3].max() == pytest.approx(100 / 3)
+
+
+BY_HAND = 0.3012345678901234
+
+
+@pytest.fixture(scope='module')
+def fitted(tmp_path_factory):
+    campaign = small_campaign(tmp_path_factory.mktemp('campaign'))
+    start = pd.DepositionModel(projection=Projection(model_plane_m=BY_HAND))
+    return refit(campaign, start, AirDrift)
+
+
+@pytest.fixture(scope='module')
+def file(tmp_path_factory, fitted) -> Path:
+    path = tmp_path_factory.mktemp('model') / 'model.yaml'
+    known = fitted.posterior, estimates(fitted.history[-1].fit)
+    write_fitted(path, fitted.study, fitted.history, *known)
+    return path
+
+
+@pytest.mark.slow
+def test_fitted_numbers_have_few_digits_and_those_by_hand_all_of_theirs(file: Path):
+    numbers = re.findall(r': (-?[\d.]+)(?:e[+-]?\d+)?\b', file.read_text())
+    assert len(numbers) > 10
+    long = [n for n in numbers if len(n.lstrip('-0.').replace('.', '')) > 8]
+    assert long == [str(BY_HAND)]
+
+
+@pytest.mark.slow
+def test_the_file_gives_the_fitted_film(file: Path, fitted):
+    experiment = fitted.study.campaign.experiments[1]
+
+    def film_on_vertices_um(model: pd.DepositionModel) -> np.ndarray:
+        surface = experiment.surface
+        integrator = FilmIntegrator(surface.points(), model, 'double', surface.occluder)
+        integrator.add(experiment.path)
+        return integrator.gauge_um
+
+    expected = film_on_vertices_um(fitted.model)
+    assert (
+        np.abs(film_on_vertices_um(pd.read_model(file)) - expected).max() < 1e-6 * expected.max()
+    )

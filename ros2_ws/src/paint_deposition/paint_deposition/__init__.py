@@ -30,3 +30,20 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return ['__version__', *_modules()]
+
+
+def git_version() -> str:
+    """`git describe` of the sources, '' where they are installed away from their repository."""
+    import subprocess
+
+    command = ['git', 'describe', '--always', '--dirty', '--tags']
+    folder = Path(__file__).resolve().parent
+    if 'site-packages' in folder.parts:  # what repository there is, it is another project's
+        return ''
+    try:
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, timeout=10, check=True
+        )
+    except (OSError, subprocess.SubprocessError):
+        return ''
+    return done.stdout.strip()

@@ -18,13 +18,13 @@ from paint_deposition.inference.posterior import Posterior
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
 from paint_deposition.motion.programmed import timed
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones, Zones
-from paint_deposition.planning.driving import PartPlaces, RobotCell, part_places
+from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.faces import PartPlan
 from paint_deposition.planning.faces import plan_faces as planned_faces
 from paint_deposition.planning.improvement import DEFAULT_TOLERANCE, FilmSummary, Improvement
+from paint_deposition.planning.part_places import PartPlaces, part_places
 from paint_deposition.planning.plan import Plan, driven, kept_clear, optimise
 from paint_deposition.planning.plan import plan as planned
 from paint_deposition.planning.planned_film import WantedFilm, evenness, simulated
@@ -38,6 +38,7 @@ from paint_deposition.planning.requests import (
     PlanRequest,
 )
 from paint_deposition.planning.retiming import retime_for_evenness
+from paint_deposition.planning.sprayable_faces import WIDEST_RAD
 from paint_deposition.planning.surface_map import painted_side
 from paint_deposition.request import takes
 

@@ -2,15 +2,12 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from threading import Event
 
 import numpy as np
 
 from paint_deposition.api.simulation import look_at_guns
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.motion_files import GunMotion
-from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm, without_refused_states
 from paint_deposition.film.statistics import (
@@ -21,7 +18,8 @@ from paint_deposition.film.statistics import (
 from paint_deposition.motion.pose_stream import PoseBatch, events_of
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.live.page import Scene
+from paint_deposition.report.colour_scales import film_scale
+from paint_deposition.report.live_page import Scene
 
 # The film is shown so often [s].
 PERIOD_S = 0.2
@@ -32,7 +30,7 @@ class Replay:
 
     Args:
         surface: the part; it is turned round if the gun looks at its back.
-        motions: of each gun, in the frame of the part.
+        motions: the name of each gun, and its motion in the frame of the part.
         models: of each gun.
         rate: speed relative to the recording; 0: as fast as it can be painted.
         target_um, tolerance_um: the film wanted and what it may differ [um].
@@ -48,7 +46,7 @@ class Replay:
     def __init__(
         self,
         surface: Surface,
-        motions: Sequence[GunMotion],
+        motions: Sequence[tuple[str, Trajectory]],
         models: Sequence[DepositionModel],
         *,
         rate: float = 1.0,
@@ -57,23 +55,27 @@ class Replay:
         tolerance_um: float = 0.0,
     ) -> None:
         require_band(target_um, tolerance_um)
-        motions = [
-            replace(motion, trajectory=without_refused_states(motion.trajectory, model))
-            for motion, model in zip(motions, models, strict=True)
-        ]
-        trajectories = [motion.trajectory for motion in motions]
+        names, recorded = zip(*motions, strict=True)
+        trajectories = [without_refused_states(*gun) for gun in zip(recorded, models, strict=True)]
         seen = look_at_guns(surface, trajectories, models, max_pose_gap_s=max_pose_gap_s)
         self.warnings = tuple(
             w for gun in seen for w in (*gun.trajectory.warnings, *gun.geometry.warnings)
         )
         self._surface, self._points = seen[0].surface, seen[0].surface.points()
-        self._motions, self._models, self._rate = motions, models, rate
+        self._names, self._motions, self._models, self._rate = names, trajectories, models, rate
         self._gap_s, self._target = max_pose_gap_s, (target_um, tolerance_um)
         # A stream that was restarted is painted in the order in which it was recorded.
-        self._times_ns = [np.maximum.accumulate(m.trajectory.stamps_ns) for m in motions]
+        self._times_ns = [np.maximum.accumulate(motion.stamps_ns) for motion in trajectories]
         self._start_ns = min(int(times[0]) for times in self._times_ns)
         self._end_ns = max(int(times[-1]) for times in self._times_ns)
-        self._flows = [_flow_at_poses(motion.trajectory) for motion in motions]
+        # Relative flow (N,) at each pose; 1 without a trigger.
+        self._flows = []
+        for motion in trajectories:
+            order = np.argsort(motion.trigger_stamps_ns, kind='stable')
+            stamps_ns = motion.trigger_stamps_ns[order]
+            passed = np.searchsorted(stamps_ns, motion.stamps_ns, side='right')
+            before = 0.0 if len(order) else 1.0
+            self._flows.append(np.append(before, motion.trigger_flow[order])[passed])
         self._paused, self._again = Event(), Event()
         self.scene = Scene()
         self.scene.show_part(self._surface)
@@ -101,12 +103,12 @@ class Replay:
         """Paint once, until the end or until that is no longer wanted."""
         self.scene.begin_again()
         unpainted = []
-        for gun, model in zip(self._motions, self._models, strict=True):
+        for motion, model in zip(self._motions, self._models, strict=True):
             film = LiveFilm(
                 self._points, model, occluder=self._surface.occluder, max_pose_gap_s=self._gap_s
             )
             # It knows when the gun will be switched, as it does offline.
-            film.replay(events_of(gun.trajectory, until=0))
+            film.replay(events_of(motion, until=0))
             unpainted.append(film)
         films = LiveFilms(tuple(unpainted))
         self._show(films, 0.0)
@@ -124,13 +126,13 @@ class Replay:
                 elapsed_s = (now_ns - self._start_ns) * 1e-9 + 1.0
             now_ns = min(self._start_ns + round(elapsed_s * 1e9), self._end_ns)
             for number, film in enumerate(films.guns):
-                motion, times_ns = self._motions[number].trajectory, self._times_ns[number]
+                motion, times_ns = self._motions[number], self._times_ns[number]
                 first, end = np.searchsorted(times_ns, [shown_ns, now_ns], side='right').tolist()
                 film.replay(events_of(motion, first, end))
                 batch = PoseBatch(motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw)
                 for row in range(first, end):
                     for place, z_axis in zip(*batch.select([row]).finite_axes(), strict=True):
-                        name, flow = self._motions[number].name, self._flows[number][row]
+                        name, flow = self._names[number], self._flows[number][row]
                         self.scene.move_gun(name, place, z_axis, flow)
             shown_ns = now_ns
             self._show(films, (now_ns - self._start_ns) * 1e-9)
@@ -146,12 +148,3 @@ class Replay:
         self.scene.show_scale(scale, DEFAULT_PAINTED_ABOVE_UM, target_um, tolerance_um)
         self.scene.show_film(film_um)
         self.scene.add_figures(time_s, figures)
-
-
-def _flow_at_poses(motion: Trajectory) -> np.ndarray:
-    """(N,) relative flow at each pose; 1 without a trigger."""
-    if not len(motion.trigger_flow):
-        return np.ones(len(motion))
-    order = np.argsort(motion.trigger_stamps_ns, kind='stable')
-    passed = np.searchsorted(motion.trigger_stamps_ns[order], motion.stamps_ns, side='right')
-    return np.concatenate([[0.0], motion.trigger_flow[order]])[passed]

@@ -1,6 +1,6 @@
 """The film that recorded motions leave on a part, how the guns ran over it, and sample files."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -214,21 +214,16 @@ def simulate(
         for layer, seeing in laid.by_layer(readings.layer).items():
             predicted_um[seeing] = at_points.layer_gauge_um(laid, layer)[: len(part)][seeing]
         doubts = readings_in_doubt(surface, readings, predicted_um)
+    added = []
+    for name in laid.names if coats else ():
+        rows = laid.guns_of(name)
+        used, coat_um = common.of_guns(rows).used, common.layer_um(laid, name)
+        of_coat = film_statistics(coat_um, surface.vertex_areas_m2, used.emitted_cm3)
+        added.append(CoatFilm(name, guns[rows], coat_um, of_coat, used))
     return Film(
         surface, guns, film_um, statistics, readings, predicted_um, common.used, doubts,
-        tuple(_coats(surface, guns, common, laid)) if coats else (), point_zones,
+        tuple(added), point_zones,
     )  # fmt: skip
-
-
-def _coats(
-    surface: Surface, guns: Sequence[GunFilm], common: CommonFilm, coats: Coats
-) -> Iterator[CoatFilm]:
-    """What each coat adds."""
-    for name in coats.names:
-        rows = coats.guns_of(name)
-        used, film_um = common.of_guns(rows).used, common.layer_um(coats, name)
-        statistics = film_statistics(film_um, surface.vertex_areas_m2, used.emitted_cm3)
-        yield CoatFilm(name, tuple(guns[rows]), film_um, statistics, used)
 
 
 def _painted(

@@ -15,8 +15,8 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import BatchError, did_you_mean
+from paint_deposition.files.atomic import read_yaml
 from paint_deposition.files.motion_files import MotionSource
-from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose

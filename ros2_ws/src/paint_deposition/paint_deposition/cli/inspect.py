@@ -83,9 +83,10 @@ def _contents(
     from paint_deposition.files.meshes import SUFFIXES
     from paint_deposition.files.motion_files import MotionSource, read_table
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
+    from paint_deposition.files.recordings.bag_files import open_bag
+    from paint_deposition.files.recordings.bags import BOOL_TYPE
     from paint_deposition.files.recordings.messages import STATE_TYPE
-    from paint_deposition.files.recordings.pose_topics import summarise
-    from paint_deposition.files.recordings.triggers import BOOL_TYPE
+    from paint_deposition.files.recordings.pose_topics import sources_of_poses
     from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
     from paint_deposition.files.tables.readings import holds_readings
     from paint_deposition.files.tables.sheets import is_gauge_file
@@ -110,7 +111,8 @@ def _contents(
     if is_rapid(path):
         program = read_program(path, **of_program)
         return asdict(program), [program_as_text(program)]
-    topics, sources = summarise(path, max_pose_gap_s)
+    with open_bag(path) as bag:
+        topics, sources = bag.topics, [*sources_of_poses(bag, max_pose_gap_s)]
     triggers = [t.name for kind in (STATE_TYPE, BOOL_TYPE) for t in topics if t.type == kind]
     figures = {
         'path': str(path), 'topics': [asdict(topic) for topic in topics],
@@ -270,7 +272,7 @@ def _gun_on_part(
         model = model_for(model_file, path).model
         seen = pd.look_at(part.surface(), recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:
-            from paint_deposition.report.pictures.motion import write_geometry_picture
+            from paint_deposition.report.pictures.planning import write_geometry_picture
 
             show('drawing')
             title = f'{path.name} over {Path(str(part.mesh)).name}'

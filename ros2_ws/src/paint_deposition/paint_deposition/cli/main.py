@@ -8,7 +8,7 @@ import sys
 import click
 from click.shell_completion import CompletionItem
 
-from paint_deposition import __version__
+from paint_deposition import __version__, git_version
 from paint_deposition.errors import PaintError, did_you_mean
 
 # As fitting/one_thread.py does for the fits of a script, here for all that a command computes; to
@@ -31,7 +31,7 @@ COMMANDS = {
         '--mesh door.stl --model bell/model.yaml --target-um 20 -o passes'),
     'improve': ('planning', 'Make the film of a programme more even: speeds, flows, triggers.',
         '--mesh door.stl --trajectory passes/trajectory --model found/model.yaml -o better'),
-    'measure': ('place', 'Choose where to put the gauge on a part.',
+    'measure': ('simulate', 'Choose where to put the gauge on a part.',
         '--mesh door.stl --trajectory door_horizontal --points 40 -o points'),
     'compare': ('inference', 'Compare the model with gauge readings.',
         'measured_door/campaign.yaml --model bell/model.yaml -o compared'),
@@ -41,9 +41,9 @@ COMMANDS = {
         'measured_door/campaign.yaml --add incidence_attraction -o refitted'),
     'sweep': ('simulate', 'Compute many variations of one job, on all cores or a cluster.',
         'my_sweep.yaml -o swept'),
-    'place': ('place', 'Find where the part may stand for the robot to drive all passes.',
+    'place': ('planning', 'Find where the part may stand for the robot to drive all passes.',
         '--trajectory passes/passes.mod --urdf my_arm.urdf --part-pose 2 0 0 0 0 0 1 -o map'),
-    'locate': ('place', 'Find the pose of the part from touched points.',
+    'locate': ('simulate', 'Find the pose of the part from touched points.',
         '--touched my_touched.csv --points my_points.csv'),
     'watch': ('runs', 'Show a run or a live cell on a page in 3D.',
         'door_horizontal --mesh door.stl --trigger /atomizer/state'),
@@ -109,8 +109,6 @@ def paint(context: click.Context, shows_version: bool) -> None:
     Lengths are in metres, film in micrometres. `paint COMMAND --help` says more.
     """
     if shows_version:
-        from paint_deposition.files.version import git_version
-
         click.echo(f'paint {__version__} {git_version()}'.rstrip())
         context.exit()
     if context.invoked_subcommand is None:

@@ -127,13 +127,11 @@ def option_of(kind: type[BaseModel], name: str, **settings: Any) -> Decorator:
     field = kind.model_fields[name]
     known = field.get_default(call_default_factory=True)
     shown: Callable[[Any], Any] = math.degrees if _is_angle(name) else lambda value: value
-    annotation, metadata = _bare(field.annotation, field.metadata)
     default = None if known is None else shown(known)
-    found: dict[str, Any] = {'help': field.description, 'default': default}
-    if annotation is bool:
-        found['is_flag'] = True
-    else:
-        found |= _type(annotation, metadata, shown) | {'show_default': known is not None}
+    found = _type(field.annotation, field.metadata, shown)
+    found |= {'help': field.description, 'default': default}
+    if 'is_flag' not in found:
+        found['show_default'] = known is not None
     if 'metavar' in _extra(field):
         found['metavar'] = _extra(field)['metavar']
     return click.option(*_names(name, field), name, **found | settings)
@@ -153,30 +151,23 @@ def _names(name: str, field: FieldInfo) -> list[str]:
     return str(_extra(field).get('option', usual.replace('_', '-'))).split()
 
 
-def _bare(annotation: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:
-    """A type without None and annotations, and what these say."""
-    while True:
-        others = [kind for kind in get_args(annotation) if kind is not NoneType]
-        if get_origin(annotation) is Annotated:
-            annotation, metadata = others[0], [*metadata, *others[1:]]
-        elif len(others) < len(get_args(annotation)):
-            (annotation,) = others
-        else:
-            flat = (getattr(one, 'metadata', [one]) for one in metadata)
-            return annotation, [one for ones in flat for one in ones]
-
-
-def _type(
-    annotation: Any, metadata: list[Any], shown: Callable[[Any], Any] = lambda bound: bound
-) -> dict[str, Any]:
+def _type(annotation: Any, metadata: list[Any], shown: Callable[[Any], Any]) -> dict[str, Any]:
     """Settings of click for a type; ``shown`` brings bounds to the option's unit."""
     origin, within = get_origin(annotation), get_args(annotation)
+    others = [kind for kind in within if kind is not NoneType]
+    if origin is Annotated:
+        flat = (getattr(one, 'metadata', [one]) for one in others[1:])
+        return _type(others[0], [*metadata, *(one for ones in flat for one in ones)], shown)
+    if len(others) < len(within):
+        return _type(others[0], metadata, shown)
+    if annotation is bool:
+        return {'is_flag': True}
     if origin is Literal:
         return {'type': click.Choice(list(within))}
     if origin in (tuple, list):
         longest = next((one.max_length for one in metadata if isinstance(one, MaxLen)), None)
-        inner, about = _bare(within[0], [])
-        return _type(inner, about) | {'nargs': longest if origin is list else len(within)}
+        count = longest if origin is list else len(within)
+        return _type(within[0], [], shown) | {'nargs': count}
     if annotation is Path:
         return {'type': FILE}
     if annotation not in (float, int):

@@ -1,4 +1,4 @@
-"""Commands that lay out passes: `recommend`, `plan` and `improve`."""
+"""Commands that lay out passes: `recommend`, `plan`, `improve`, and `place` the part for them."""
 
 from __future__ import annotations
 
@@ -240,3 +240,63 @@ def _improvement_lines(result: pd.Improvement) -> Iterator[str]:
         'the robot program lays the film of the bag within '
         f'{100 * result.program_difference:.2f} % of its peak'
     )
+
+
+def _span(axis: str) -> Any:
+    return click.option(
+        f'--{axis}', f'{axis}_m', nargs=2, type=options.NUMBER, metavar='FROM TO',
+        help=f'Range of {axis} to try [m]; default: 0.6 m to both sides of --part-pose.',
+    )  # fmt: skip
+
+
+@click.command('place')
+@click.option(
+    '--trajectory', required=True, type=options.FILE,
+    help='The passes: a bag, a table of poses, or a RAPID module, in the frame of the part or, '
+    'with another frame than "part", in that of the robot with the part at --part-pose.',
+)  # fmt: skip
+@options.PART_POSE
+@options.robot_options
+@_span('x')
+@_span('y')
+@click.option(
+    '--step', 'step_m', default=0.2, show_default=True, type=options.POSITIVE,
+    help='Between places [m].',
+)  # fmt: skip
+@click.option('--free-roll', is_flag=True, help='The tool may be turned about its own axis.')
+@results_options('place.json, places.csv and the map')
+def place_command(
+    trajectory: Path,
+    part_pose: list[float] | None,
+    robot: dict[str, Any],
+    x_m: tuple[float, float] | None,
+    y_m: tuple[float, float] | None,
+    step_m: float,
+    free_roll: bool,
+    results: Results,
+) -> None:
+    """Look where the part may stand so that the robot drives all passes.
+
+    Height and turn of the part are those of --part-pose; x and y are tried on a grid.
+    """
+    import numpy as np
+
+    from paint_deposition.api.planning import place
+
+    cell = robot_cell(robot, part_pose)
+    if cell is None or part_pose is None:
+        raise click.UsageError('give the robot as --urdf, and --part-pose')
+    spans = [
+        span or (about - 0.6, about + 0.6)
+        for span, about in zip((x_m, y_m), part_pose[:2], strict=True)
+    ]
+    x, y = (low + step_m * np.arange(int((high - low) / step_m + 1e-6) + 1) for low, high in spans)
+    with Progress('place') as show:
+        show('reading')
+        recorded = pd.read_recording(trajectory)
+        found = place(recorded, cell, x, y, free_roll, show)
+        results.write(found, made_from=inputs(trajectory=trajectory, urdf=robot['urdf']))
+    lines = [found.sentence]
+    if found.speed.max() > 0.0:
+        lines.append('--part-pose ' + ' '.join(f'{value + 0.0:.6g}' for value in found.part_pose))
+    results.print(lines, notes=recorded.notes)

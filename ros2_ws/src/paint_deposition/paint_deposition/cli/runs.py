@@ -17,7 +17,7 @@ from paint_deposition.cli import options
 from paint_deposition.cli.models import models_for
 from paint_deposition.cli.results import SHOW_PROGRESS_AFTER_S, Progress, print_all, python
 from paint_deposition.errors import PaintError
-from paint_deposition.report.live.page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
+from paint_deposition.report.live_page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 
 if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
@@ -118,7 +118,7 @@ def _replay(
     named = Path(recorded['model_file']) if recorded.get('model_file') else None
     guns = read_gun_motions([run], validate(MotionSource, 'motion', motion, pd.PaintError))
     files = [file for file in (model_file or named,) if file]
-    chosen = models_for(files, [run], [gun.name for gun in guns], named=model_file is not None)
+    chosen = models_for(files, [run], [name for name, _ in guns], named=model_file is not None)
     show('refining the mesh')
     surface = part.surface(Path(mesh))
     replay = Replay(surface, guns, [model.model for model in chosen], **given)

@@ -1,4 +1,4 @@
-"""The commands `simulate` and `sweep`: the film on a part, and that of many variations."""
+"""Commands on one part: `simulate`, `sweep` over variations, where to `measure`, `locate` it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,18 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.models import models_for
-from paint_deposition.cli.results import Progress, Results, inputs, results_options, zone_lines
-from paint_deposition.request import FilmBand
+from paint_deposition.cli.models import chosen_model, model_for, models_for
+from paint_deposition.cli.results import (
+    Progress,
+    Results,
+    inputs,
+    print_all,
+    results_options,
+    zone_lines,
+)
+from paint_deposition.errors import RecordingError
+from paint_deposition.planning.requests import FilmBuild, MeasureRequest
+from paint_deposition.request import FilmBand, MotionOptions
 
 if TYPE_CHECKING:
     from paint_deposition.film.statistics import FilmStatistics
@@ -85,18 +94,17 @@ def simulate_command(
 
         show('reading')
         source = validate(MotionSource, 'motion', motion, pd.PaintError)
-        guns = read_gun_motions(trajectories, source, atomizers)
-        chosen = models_for(model_files, trajectories, [gun.name for gun in guns])
+        names, motions = zip(*read_gun_motions(trajectories, source, atomizers), strict=True)
+        chosen = models_for(model_files, trajectories, names)
         show('refining the mesh')
         surface, readings = part.surface(), None
         zones = part.zones()
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(
-            surface, [gun.trajectory for gun in guns], [model.model for model in chosen],
-            names=[gun.name for gun in guns], coats=coats, wet_on_wet=wet_on_wet,
-            readings=readings, max_pose_gap_s=max_pose_gap_s, zones=zones, strict=source.strict,
-            progress=show, **dict(band),
+            surface, motions, [model.model for model in chosen], names=names, coats=coats,
+            wet_on_wet=wet_on_wet, readings=readings, max_pose_gap_s=max_pose_gap_s, zones=zones,
+            strict=source.strict, progress=show, **dict(band),
         )  # fmt: skip
         made_from = {
             **inputs(mesh_file=part.mesh, zones_file=part.zones_file),
@@ -193,3 +201,116 @@ def sweep_command(sweep: Path, results: Results, scheduler: str | None, count: i
         more = f'{len(warnings) - most} more in {results.output / "cases.parquet"}'
         warnings = [*warnings[:most], more]
     results.print(found.lines, notes=found.job.notes, warnings=warnings)
+
+
+@click.command('locate')
+@click.option(
+    '--touched', required=True, type=options.FILE,
+    help='Points of the part that the robot touched, in its frame: CSV with point, x, y, z.',
+)  # fmt: skip
+@click.option(
+    '--points', required=True, type=options.FILE,
+    help='The same points in the frame of the part, by the same names.',
+)  # fmt: skip
+@options.option_of(MotionOptions, 'pose_unit')
+@options.JSON
+def locate_command(touched: Path, points: Path, pose_unit: str | None, as_json: bool) -> None:
+    """Find the pose of a part in the frame of the robot, to be given as --part-pose.
+
+    From three or more named points that the robot touched.
+    """
+    from paint_deposition.files.atomic import json_text
+    from paint_deposition.files.gauge_readings import read_points
+    from paint_deposition.files.provenance import origin
+    from paint_deposition.planning.part_places import locate
+
+    given = read_points(touched, pose_unit), read_points(points, pose_unit)
+    try:
+        place = locate(*given)
+    except RecordingError as error:
+        raise RecordingError(f'{touched} and {points}: {error}') from None
+    print_all('warning', place.warnings)
+    if as_json:
+        files = {'touched': touched, 'points': points}
+        click.echo(json_text(place.to_dict() | {'provenance': origin(files=files)}))
+        return
+    values = [f'{value + 0.0:.6g}' for value in place.pose.values]
+    click.echo(f'--part-pose {" ".join(values)}')
+    click.echo(f'part_pose: [{", ".join(values)}]')
+    click.echo(f'residual {place.rms_m * 1e3:.2f} mm RMS')
+    for name, residual_m in place.residuals_m.items():
+        click.echo(f'  {name}: {residual_m * 1e3:.2f} mm')
+
+
+@click.command('measure')
+@options.part_options(0.01)
+@click.option(
+    '--trajectory', type=options.FILE,
+    help='The motion, as `simulate` takes it; default: passes as `plan` would lay them, '
+    'with --target-um or --speed.',
+)  # fmt: skip
+@options.model_option()
+@options.BRUSH
+@options.options_of(MeasureRequest)
+@options.options_of(FilmBuild, into='passes')
+@options.motion_options
+@options.MAX_POSE_GAP
+@options.ALLOW_EFFECTS
+@results_options('points.csv, poses.csv, points.png and measure.json')
+def measure_command(
+    request: MeasureRequest,
+    passes: FilmBuild,
+    part: options.Part,
+    trajectory: Path | None,
+    model_file: Path | None,
+    brush: int,
+    motion: dict[str, Any],
+    max_pose_gap_s: float,
+    results: Results,
+) -> None:
+    """Choose where to put the gauge on a part, so that missing effects are found soonest.
+
+    Fill the column thickness_um of points.csv and give that file as the measurements of a
+    campaign.
+    """
+    if trajectory is None and passes == FilmBuild():
+        raise click.UsageError(
+            'no motion is given; give --trajectory, or --target-um for passes '
+            'as `plan` would lay them'
+        )
+    with Progress('measure') as show:
+        show('reading')
+        surface = part.surface()
+        warnings: tuple[str, ...] = ()
+        if trajectory is None:
+            chosen = chosen_model(model_file, brush=brush)
+            recorded = pd.plan(surface, chosen.model, progress=show, **dict(passes)).trajectory
+        else:
+            chosen = model_for(model_file, trajectory)
+            recorded = pd.read_recording(trajectory, **motion)
+            warnings = recorded.warnings
+        result = pd.choose_readings(
+            surface, recorded, chosen.model, posterior=chosen.posterior,
+            max_pose_gap_s=max_pose_gap_s, progress=show, **dict(request),
+        )  # fmt: skip
+        made_from = inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=chosen.path)
+        show('writing and drawing')
+        results.write(result, made_from=made_from, part_pose=motion['part_pose'])
+    results.print(_point_lines(result), chosen.words, result.surface.notes, warnings)
+
+
+def _point_lines(result: pd.ChosenReadings) -> Iterator[str]:
+    yield result.sentence
+    hidden = []
+    for name, chance in sorted(result.power.items(), key=lambda pair: -pair[1]):
+        if chance < 0.15:  # the part hardly shows it
+            hidden.append(name)
+            continue
+        grid = result.grid_power[name]
+        yield f'{name:>22} {100 * chance:3.0f} %   on a grid {100 * grid:3.0f} %'
+    if hidden:
+        yield f'unlikely to be detected on this part at their typical size: {", ".join(hidden)}'
+    yield (
+        f'at least {result.apart_m * 1e3:.0f} mm from each other and {result.foot_m * 1e3:.0f} mm '
+        f'off edges; {result.repeats} of them are to be read twice'
+    )

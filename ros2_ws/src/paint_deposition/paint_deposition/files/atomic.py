@@ -1,11 +1,12 @@
 """Files that are written whole or not at all, after a power cut too, and read with a limit.
 
-Texts, JSON that every reader takes (no NaN), Parquet tables, and texts by a template.
+Texts, YAML, JSON that every reader takes (no NaN), Parquet tables, and texts by a template.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 import zipfile
 import zlib
@@ -17,7 +18,7 @@ from uuid import uuid4
 
 from pydantic_core import to_json, to_jsonable_python
 
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import LONGEST_QUOTED, PaintError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 # memory. Of a text that a person edits.
 MOST_MB, MOST_TEXT_MB = 2000, 20
 MOST_EXPANDED_BYTES, BLOCK_BYTES = 1_000_000_000, 1 << 20
+# Levels of a YAML document, and its values with each alias in full.
+MOST_LEVELS, MOST_VALUES = 500, 100_000
 
 
 def require_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> None:
@@ -63,6 +66,70 @@ def read_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST
     """The content of a file that ``require_file`` takes. Raises OSError as Path.read_bytes."""
     require_file(path, refusal, most_mb)
     return Path(path).read_bytes()
+
+
+def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
+    """The one document of a file, which should be a ``kind``.
+
+    It is YAML 1.2 in which a key may not be given twice. Raises ``refusal`` where the file cannot
+    be read or is none.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        text = read_file(path, refusal, MOST_TEXT_MB).decode('utf-8')
+        require_small(text)
+        return YAML(typ='safe', pure=True).load(text)
+    except FileNotFoundError:
+        raise refusal(f'{path}: no such file; give a {kind} YAML') from None
+    except OSError as error:
+        raise refusal(f'{path}: cannot be read ({error.strerror})') from None
+    except (RecursionError, OverflowError):
+        raise refusal(
+            f'{path}: its values are nested too deeply, or too many by aliases; give a {kind} YAML'
+        ) from None
+    except UnicodeDecodeError:
+        raise refusal(
+            f'{path}: is no text, such as a workbook or a bag; give a {kind} YAML in UTF-8'
+        ) from None
+    except YAMLError as error:
+        mark, problem = getattr(error, 'problem_mark', None), ' '.join(str(error).split())
+        if mark is not None:
+            problem = str(getattr(error, 'problem', error)).split(' with value')[0]
+            problem = f'line {mark.line + 1}: {problem[:LONGEST_QUOTED]}'
+        raise refusal(f'{path}: cannot be read as YAML ({problem})') from None
+
+
+def require_small(text: str) -> None:
+    """Refuse YAML that nests, or of which aliases make, more than any file of the trade has.
+
+    Raises OverflowError, or what the text itself provokes. Parsers written in C would end the
+    process; a few hundred bytes of aliases could stand for gigabytes.
+    """
+    depth = 0
+    for mark in re.findall(r'[\[{}\]]', text):
+        depth = max(depth + (1 if mark in '[{' else -1), 0)
+        if depth > MOST_LEVELS:
+            raise OverflowError('brackets')
+    if max(map(len, re.findall(r'^[ \t?:-]*', text, re.MULTILINE)), default=0) > MOST_LEVELS:
+        raise OverflowError('indentation')
+    if re.search(r'(^|[\s\[{,])\*', text):
+        from ruamel.yaml import YAML
+
+        _size(YAML(typ='safe', pure=True).compose(text), {})
+
+
+def _size(node: Any, known: dict[int, int]) -> int:
+    """How many values a node of YAML stands for, each alias in full."""
+    if id(node) not in known:
+        known[id(node)] = MOST_VALUES  # where it is found within itself
+        held = node.value if node and isinstance(node.value, list) else []
+        nodes = (part for one in held for part in (one if isinstance(one, tuple) else (one,)))
+        known[id(node)] = 1 + sum(_size(part, known) for part in nodes)
+    if known[id(node)] >= MOST_VALUES:
+        raise OverflowError('aliases')
+    return known[id(node)]
 
 
 @contextmanager

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from paint_deposition.errors import PaintError, ReadingsError
+from paint_deposition.files.atomic import read_yaml
 from paint_deposition.files.campaign_coats import (
     Name,
     PaintJob,
@@ -20,7 +21,6 @@ from paint_deposition.files.campaign_coats import (
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.headings import length_of
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.files.zones_file import read_zones

@@ -102,7 +102,18 @@ def read_triangles(
         )
     if unit_m * scale != 1.0:
         vertices = vertices.astype(np.float64) * (unit_m * scale)
-    _check_extent(path, vertices, faces)
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    extent = float(box_extent_m(vertices if used.all() else vertices[used]).max())
+    if not 0.005 <= extent <= LARGEST_M:
+        found = f'only {extent * 1e3:.3g} mm large, it looks scaled down; use a larger '
+        remedy = '--mesh-scale, or mesh_scale'
+        if extent > LARGEST_M:
+            found = f'{extent:.4g} m large, it looks like millimetres; use '
+            remedy = '--mesh-scale 0.001, or mesh_scale: 0.001'
+        raise MeshError(
+            f"{path}: the part would be {found}{remedy} in a campaign or as the node's parameter"
+        )
     vertices, faces = weld(vertices, faces)
     # Triangles lower than this have no direction that could be trusted.
     heights_wanted = 1e-7 * longest_edges_m(vertices, faces)
@@ -118,22 +129,6 @@ def read_triangles(
 def _require_above_zero(name: str, value: float, meaning: str) -> None:
     if not (np.isfinite(value) and value > 0.0):
         raise MeshError(f'{name} = {value:g}; give a number above 0: {meaning}')
-
-
-def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None:
-    used = np.zeros(len(vertices_m), dtype=bool)
-    used[faces] = True
-    corners_m = vertices_m if used.all() else vertices_m[used]
-    extent = float(box_extent_m(corners_m).max())
-    if not 0.005 <= extent <= LARGEST_M:
-        found = f'only {extent * 1e3:.3g} mm large, it looks scaled down; use a larger '
-        remedy = '--mesh-scale, or mesh_scale'
-        if extent > LARGEST_M:
-            found = f'{extent:.4g} m large, it looks like millimetres; use '
-            remedy = '--mesh-scale 0.001, or mesh_scale: 0.001'
-        raise MeshError(
-            f"{path}: the part would be {found}{remedy} in a campaign or as the node's parameter"
-        )
 
 
 def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np.ndarray:

@@ -18,14 +18,12 @@ from paint_deposition.effects.catalogue import (
     effect_class,
     learned_law,
     load_effect_file,
-    load_unnamed_effect_file,
 )
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError, quoted
-from paint_deposition.files.atomic import plain, write_text
-from paint_deposition.files.strict_yaml import read_yaml
+from paint_deposition.files.atomic import plain, read_yaml, write_text
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.eq1_pattern import MOST, Brush, PlanarPattern, SetPoints
 from paint_deposition.model.eq2_projection import Projection
@@ -127,25 +125,6 @@ def write_model(
         'history': list(history or ()),
     }
     write_text(path, model_text(model, path.parent, header_comment or '', name, extras))
-
-
-def model_of(values: Mapping[str, Any]) -> DepositionModel:
-    """The model that the ``provenance`` of a result describes; its brushes are a list there.
-
-    Raises:
-        ModelError: it has an effect of a user's own, whose file is not named there.
-    """
-    # Results of earlier versions also say whether a brush was interpolated.
-    about = {'number', 'interpolated'}
-    try:
-        brushes = {
-            brush['number']: {key: value for key, value in brush.items() if key not in about}
-            for brush in values.get('brushes', ())
-        }
-    except (KeyError, TypeError, AttributeError):
-        raise ModelError('brushes is no list of brushes with their number') from None
-    sections = {**values, 'brushes': brushes or None}
-    return _model_file(sections, load_unnamed_effect_file).model
 
 
 def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:

@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from paint_deposition.files.rapid.program import is_rapid, program_trajectory, r
 from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.recordings.messages import JOINT_TYPE
+from paint_deposition.files.recordings.pose_topics import lookups, read_frames
 from paint_deposition.files.tables.pose_columns import CONVENTIONS, ROTATION_WORDS
 from paint_deposition.files.tables.poses import is_pose_table, read_pose_table
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_frame, is_pose, moved
@@ -69,14 +70,6 @@ class MotionSource(MotionOptions):
             if plural[kind] not in kinds and getattr(self, name) is not None:
                 option = f'--{name.replace("_", "-")}'
                 raise RecordingError(f'{option} is for {kinds}, {path} is {kind}; leave it out')
-
-
-@dataclass(frozen=True)
-class GunMotion:
-    """The name of a gun, '' for the only one, and its motion in the frame of the part."""
-
-    name: str
-    trajectory: Trajectory
 
 
 def read_recording(
@@ -161,8 +154,8 @@ def read_table(path: Path, source: MotionSource) -> Trajectory:
 
 def read_gun_motions(
     files: Sequence[Path], source: MotionSource, atomizers: Sequence[str] = ()
-) -> list[GunMotion]:
-    """Read the motion of each gun from a bag, a RAPID module or a table for each.
+) -> list[tuple[str, Trajectory]]:
+    """The name of each gun, '' for the only one, and its motion, from a file for each.
 
     Or from one bag with all ``atomizers``, whose names precede their topics, as in
     /robot_1/atomizer/pose; a gun without a recorded state sprays whenever it moves. Raises
@@ -186,7 +179,7 @@ def read_gun_motions(
         names = [f'{name} {number}' for number, name in enumerate(names, start=1)]
     each = list(files) * (len(names) if len(files) == 1 else 1)
     of_each = zip(names, each, guns or [''] * len(each), strict=True)
-    return [GunMotion(name, read_motion(file, source, gun)) for name, file, gun in of_each]
+    return [(name, read_motion(file, source, gun)) for name, file, gun in of_each]
 
 
 def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
@@ -240,8 +233,6 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
         return replace(brought, notes=(*brought.notes, note))
     known = ''
     if bag is not None and (recorded.frames or not is_frame(named, part)):
-        from paint_deposition.files.recordings.pose_topics import read_frames
-
         tree = read_frames(bag)
         recorded = _by_transforms(recorded, part, tree, bag, source.part_pose)
         fixed = tree.connected(named)
@@ -270,8 +261,6 @@ def _by_transforms(
     A pose without a frame is the part's. If nothing places the part, it is the most frequent
     frame of the poses; poses for which no transform is known are left out.
     """
-    from paint_deposition.files.recordings.pose_topics import lookups
-
     named = recorded.frame_id
     frames = np.array(recorded.frames or [named] * len(recorded))
     own = [frame for frame in {*frames.tolist()} if is_frame(frame, part)]

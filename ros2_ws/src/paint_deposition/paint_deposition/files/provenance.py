@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from paint_deposition import __version__
+from paint_deposition import __version__, git_version
 from paint_deposition.effects.catalogue import load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError
@@ -25,7 +25,6 @@ from paint_deposition.files.atomic import (
 from paint_deposition.files.model_file import ModelFile, model_source, read_model_file
 from paint_deposition.files.rapid.program import is_rapid
 from paint_deposition.files.recordings.bag_files import custom_data
-from paint_deposition.files.version import git_version
 
 
 def provenance(mesh_file: str = '', model_file: str = '') -> dict[str, str]:

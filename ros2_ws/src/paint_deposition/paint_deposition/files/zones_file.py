@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from paint_deposition.errors import PaintError, quoted
+from paint_deposition.files.atomic import read_yaml
 from paint_deposition.files.meshes import read_triangles
-from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.film.statistics import require_band
 from paint_deposition.part.zones import Box, Patch, Region, Zone, Zones
 from paint_deposition.request import Number, Text, validate
@@ -59,16 +59,11 @@ class ZoneEntry(BaseModel, extra='forbid'):
             raise ValueError(str(error)) from None
         if self.mesh_scale and not self.mesh:
             raise ValueError('mesh_scale has no mesh; give both, or --mesh-scale for the part')
-        if not (self.box or self.has_triangles):
+        if not (self.box or self.mesh or self.body or self.faces):
             raise ValueError('it has no place; give box, body, faces or mesh')
         if self.box and not all(low < high for low, high in zip(*self.box, strict=True)):
             raise ValueError(f'box is {self.box}; give its lowest corner first, then its highest')
         return self
-
-    @property
-    def has_triangles(self) -> bool:
-        """Whether the place is told by triangles of a mesh."""
-        return bool(self.mesh or self.body or self.faces)
 
 
 def read_zones(
@@ -106,7 +101,7 @@ def _regions(
     folder: Path, entry: ZoneEntry, part: Path, scale: float, body: str | None
 ) -> tuple[Region, ...]:
     regions: list[Region] = [Box(np.array(entry.box))] if entry.box else []
-    if entry.has_triangles:
+    if entry.mesh or entry.body or entry.faces:
         mesh = folder / entry.mesh if entry.mesh else part
         of_mesh = entry.body or (None if entry.mesh else body)
         vertices_m, faces, rows, _ = read_triangles(mesh, entry.mesh_scale or scale, of_mesh)

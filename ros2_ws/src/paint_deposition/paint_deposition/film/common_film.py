@@ -32,17 +32,11 @@ def sum_um(films: Iterable[tuple[int, np.ndarray]]) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Coats:
-    """Coats in the order of painting, each laid by one gun or several.
+    """Coats in the order of painting, each laid by one gun or several."""
 
-    Attributes:
-        names: (C,) each once; '' is the only coat, of which nothing more is known.
-        on_wet: (C,) whether each was laid while the one before it was wet.
-        ends: (C,) number of guns that laid it or a coat before it.
-    """
-
-    names: tuple[str, ...]
-    on_wet: tuple[bool, ...]
-    ends: tuple[int, ...]
+    names: tuple[str, ...]  # (C,) each once; '' is the only coat, of which nothing more is known
+    on_wet: tuple[bool, ...]  # (C,) whether each was laid while the one before it was wet
+    ends: tuple[int, ...]  # (C,) number of guns that laid it or a coat before it
 
     @staticmethod
     def of_guns(coats: Sequence[str], guns: int, on_wet: Collection[str] = ()) -> 'Coats':

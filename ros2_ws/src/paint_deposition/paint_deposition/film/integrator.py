@@ -13,14 +13,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.layout import (
-    LinesOfSight,
-    compiled_laws,
-    emission_points_m,
-    model_constants,
-    step_rows,
-    term_constants,
-)
+from paint_deposition.film import layout
 from paint_deposition.film.statistics import PaintUsed
 from paint_deposition.kernel.blocks import LARGEST_BLOCK, shared_among_threads
 from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
@@ -83,7 +76,7 @@ class FilmIntegrator:
         self._parallel = parallel
         self._real: Any = np.float32 if precision == 'single' else np.float64
         self._occluder = occluder
-        self._lines_of_sight: LinesOfSight | None = None
+        self._lines_of_sight: layout.LinesOfSight | None = None
         self._keep_absent_laws = keep_absent_laws
         self._blocks = points.blocks(self._real)
         self.reset()
@@ -97,12 +90,11 @@ class FilmIntegrator:
         )
         self._shadowed = model.shadow > 0.0 and self._occluder is not None
         if self._occluder is not None and self._shadowed and self._lines_of_sight is None:
-            self._lines_of_sight = LinesOfSight(self._occluder, self.points, self._blocks)
+            self._lines_of_sight = layout.LinesOfSight(self._occluder, self.points, self._blocks)
         # Absent effects are left out rather than computed: they change nothing, to the bit.
         self._effects = [effect for effect in model.effects if not effect.is_neutral]
-        *laws, parameters = compiled_laws(
-            model.effects if self._keep_absent_laws else self._effects
-        )
+        compiled = model.effects if self._keep_absent_laws else self._effects
+        *laws, parameters = layout.compiled_laws(compiled)
         self._variant = (*laws, self._shadowed, self._real)
         self._parameters = parameters.astype(self._real)
 
@@ -124,6 +116,12 @@ class FilmIntegrator:
         """Paint along the path; ``progress`` is called with the sub-steps done so far."""
         self.add_sprayed(self.sprayed(path)[0], progress)
 
+    def raw_of(self, path: SprayPath) -> np.ndarray:
+        """(V,) film of this path alone as it arrives, before effects on the film [um]."""
+        self.reset()
+        self.add(path)
+        return self.raw_um
+
     def add_sprayed(self, path: SprayPath, progress: Callable[[int], None] | None = None) -> None:
         """Paint along a path, or a part of one, that the effects on it have been applied to."""
         self.used += PaintUsed.of(self.model, path)
@@ -140,7 +138,7 @@ class FilmIntegrator:
 
     def paint(self, steps: Steps) -> None:
         """Paint along a path that was prepared for the effects and projection of the model."""
-        constants = model_constants(self.model)
+        constants = layout.model_constants(self.model)
         self._run(False, steps, constants, self._film, self._recent, np.empty((TERMS, 0)))
         self._done += len(steps)
 
@@ -150,7 +148,7 @@ class FilmIntegrator:
         See ``layout.term_weights``. They depend on r, sigma1 and sigma2, and where the asymmetry
         is spread over the ring, but not on K1 and K2.
         """
-        constants, none = term_constants(self.model), np.empty(0)
+        constants, none = layout.term_constants(self.model), np.empty(0)
         terms = np.zeros((len(constants), TERMS, len(self._film)))
         for row, of_brush in enumerate(terms):
             self._run(True, steps.of_brush(row), constants, none, none, of_brush)
@@ -165,17 +163,17 @@ class FilmIntegrator:
 
     def _steps(self, path: SprayPath, reach: float | None = None) -> Steps:
         """What the kernel reads; ``reach`` of lines of sight, if it is not the pattern's."""
-        rows = step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
+        rows = layout.step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
         brush = self.model.pattern_rows(path.brush)
         if not (self._lines_of_sight and self._shadowed):
             run = np.ones(LARGEST_BLOCK, dtype=np.uint8)  # everything is seen
             first = np.zeros((1, len(self._blocks.spheres)), np.int64)
             return Steps(rows, brush, run, first, np.zeros(len(rows), np.int64))
-        constants = model_constants(self.model)
+        constants = layout.model_constants(self.model)
         if reach is not None:
             constants[:, REACH] = reach
         sight, self._traced_from = self._lines_of_sight.along(
-            emission_points_m(self.model, path), rows, brush,
+            layout.emission_points_m(self.model, path), rows, brush,
             constants.astype(self._real), self._traced_from,
         )  # fmt: skip
         return Steps(rows, brush, *sight)

@@ -78,7 +78,7 @@ def sampled_collapse(
     At a fineness of 0.25 sigma_n of parallel passes is still good to 1e-5, in a tenth of the time.
     """
     standoff = options.get('standoff_m') or model.projection.nominal_standoff_m
-    widening = max(_widening(model, standoff), 1e-6)
+    widening = max(model.projection.widening(standoff), 1e-6)
     reach = model.planar.radius_of_flux_m(NEGLIGIBLE) * model.widening * widening
     finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
     count = round(fineness * min(max(math.ceil(2.0 * reach / finest * 16.0), 257), 4097))
@@ -103,7 +103,7 @@ def pass_film_um(
     ``velocity_m_per_s`` is negative backwards, ``roll_rad`` the direction of travel in the tool.
     """
     # Middles and lengths of sub-steps, even in u with distance = FINEST_STEP_M sinh(u).
-    widening = _widening(model, standoff_m)
+    widening = model.projection.widening(standoff_m)
     far = 1.5 * model.reach_m * widening
     finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
     u_far = math.asinh(far / FINEST_STEP_M)
@@ -122,12 +122,4 @@ def pass_film_um(
         velocity_m_per_s=np.tile(velocity_m_per_s * TRAVEL, (len(along), 1)),
     )
     points = SurfacePoints(x_m[:, None] * ACROSS, np.tile(OUTWARD, (len(x_m), 1)))
-    integrator = FilmIntegrator(points, model, precision='double')
-    integrator.add(path)
-    return integrator.raw_um
-
-
-def _widening(model: DepositionModel, standoff_m: float) -> float:
-    """How many times wider the pattern is at the standoff than on the model plane."""
-    distance = standoff_m + model.projection.emission_offset_m
-    return distance / model.projection.model_plane_m
+    return FilmIntegrator(points, model, precision='double').raw_of(path)

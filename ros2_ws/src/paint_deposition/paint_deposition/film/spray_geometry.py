@@ -117,8 +117,7 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> tu
         np.concatenate([edges.normals, edges.curved_normals, surface.normals[some]]),
     )
     painted = FilmIntegrator(points, model.model_copy(update={'effects': ()}))
-    painted.add(path.select(slice(None, None, 1 + len(path) // SUB_STEPS)))
-    film_um = painted.raw_um
+    film_um = painted.raw_of(path.select(slice(None, None, 1 + len(path) // SUB_STEPS)))
     count, peak_um = len(edges), film_um.max()
     if peak_um == 0.0:
         return 0.0, ''
@@ -150,6 +149,5 @@ def facet_errors_um(
         np.concatenate([points.normals, normals]),
     )
     painted = FilmIntegrator(both, model.model_copy(update={'effects': ()}))
-    painted.add(path)
-    flat_um, curved_um = np.split(painted.raw_um, 2)
+    flat_um, curved_um = np.split(painted.raw_of(path), 2)
     return curved_um - flat_um

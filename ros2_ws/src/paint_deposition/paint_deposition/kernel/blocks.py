@@ -61,7 +61,7 @@ class Blocks:
         """Sort (V, 3) positions [m] and normals; ``neighbours_together`` may be known."""
         if neighbours is None:
             neighbours = neighbours_together(positions_m)
-        origin = _centre_m(positions_m)
+        origin = box_centre_m(positions_m)
         local = np.ascontiguousarray((positions_m - origin).T)
         count = len(positions_m)
         size = _block_size(count)
@@ -89,19 +89,22 @@ class Blocks:
 
 def neighbours_together(positions_m: np.ndarray) -> np.ndarray:
     """(V,) rows of positions (V, 3) [m], those of a block one after another."""
-    local = np.ascontiguousarray((positions_m - _centre_m(positions_m)).T)
+    local = np.ascontiguousarray((positions_m - box_centre_m(positions_m)).T)
     count = len(positions_m)
     return np.concatenate(_neighbours(local, np.arange(count), _block_size(count)))
 
 
 def bounding_box_m(positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(3,) lowest and (3,) highest coordinates of positions (V, 3) [m]."""
+    """(3,) lowest and (3,) highest coordinates of positions (V, 3) [m]; 0 without any."""
+    if not len(positions_m):
+        return np.zeros(3), np.zeros(3)
     # A column at a time: over rows of three NumPy's loop takes twenty times as long.
     columns = positions_m.T
     return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
 
 
-def _centre_m(positions_m: np.ndarray) -> np.ndarray:
+def box_centre_m(positions_m: np.ndarray) -> np.ndarray:
+    """(3,) centre of the bounding box of (V, 3) points [m]."""
     low, high = bounding_box_m(positions_m)
     return 0.5 * (low + high)
 

@@ -11,8 +11,6 @@ kept on disk, under a name that covers the laws' code.
 
 from collections.abc import Callable
 from functools import lru_cache
-from types import FunctionType
-from typing import Any
 
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
@@ -20,7 +18,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from paint_deposition.kernel.blocks import LARGEST_BLOCK
 from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.fast_math import exp2
-from paint_deposition.kernel.laws import Law, Ray, product
+from paint_deposition.kernel.laws import Law, Ray, product, with_names
 
 # Columns of a sub-step's row: emission point, tool axes x and y times Omega, tool axis z, shift
 # of the pattern on the model plane, dwell times relative flow times Omega^2, speed.
@@ -208,15 +206,10 @@ def compile_kernel(
     laws = [law for law, _ in (*flux_factors, *pattern_scales)]
     counts = [[count for _, count in group] for group in (flux_factors, pattern_scales)]
     variant = counts, shadowed, real.__name__, separate_terms
-    block = named_for_its_code(_variant(paint_block, names), laws, *variant)
+    block = named_for_its_code(with_names(paint_block, names), laws, *variant)
     # Inlined by force: else the process that compiles it runs another copy than those that find
     # it on disk, with another last bit.
     block = njit(fastmath=True, error_model='numpy', forceinline=True)(block)
-    whole = _variant(accumulate, names | {'paint_block': block})
+    whole = with_names(accumulate, names | {'paint_block': block})
     whole = named_for_its_code(whole, laws, *variant)
     return njit(cache=True, nogil=True, fastmath=True, error_model='numpy')(whole)
-
-
-def _variant(template: Any, names: dict[str, object]) -> FunctionType:
-    """The function with other values for names of this module."""
-    return FunctionType(template.__code__, template.__globals__ | names, template.__name__)

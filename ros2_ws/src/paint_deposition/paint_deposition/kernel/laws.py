@@ -1,8 +1,8 @@
 """Laws of effects made ready for the kernel: in its precision, and multiplied."""
 
-from collections.abc import Callable, Sequence
-from types import FunctionType
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from types import CodeType, FunctionType
+from typing import Any, NamedTuple
 
 from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
@@ -11,20 +11,14 @@ from paint_deposition.kernel.compiler import named_for_its_code, njit
 
 
 class Ray(NamedTuple):
-    """One straight ray from the emission point to a surface point, inside the kernel.
+    """One straight ray from the emission point to a surface point, inside the kernel."""
 
-    Attributes:
-        x_m, y_m: where it pierces the model plane, tool axes [m].
-        standoff_ratio: distance along the bell's axis over Omega [1].
-        cos_incidence: cosine of the angle to the surface normal, above 0 [1].
-        speed_m_per_s: speed of the atomizer [m/s].
-    """
-
+    # Where it pierces the model plane, tool axes [m].
     x_m: float
     y_m: float
-    standoff_ratio: float
-    cos_incidence: float
-    speed_m_per_s: float
+    standoff_ratio: float  # distance along the bell's axis over Omega [1]
+    cos_incidence: float  # cosine of the angle to the surface normal, above 0 [1]
+    speed_m_per_s: float  # of the atomizer [m/s]
 
 
 Law = Callable[..., float]
@@ -41,20 +35,20 @@ def in_precision(law: Law, real: type) -> Law:
     module that it names, are replaced by ones of type ``real``. What the law's author compiled
     for it to call is compiled anew, for the kernel's kind of processor.
     """
-    code = law.__code__
+    code, known = law.__code__, law.__globals__
     constants = tuple(_as_real(value, real) for value in code.co_consts)
-    named = {
-        name: _as_real(law.__globals__[name], real)
-        for name in code.co_names
-        if name in law.__globals__
-    }
+    named = {name: _as_real(known[name], real) for name in code.co_names if name in known}
+    return with_names(law, named, code.replace(co_consts=constants))
+
+
+def with_names(
+    function: Callable[..., Any], names: Mapping[str, object], code: CodeType | None = None
+) -> FunctionType:
+    """The function with other values for names of its module, and other code."""
     return FunctionType(
-        code.replace(co_consts=constants),
-        law.__globals__ | named,
-        law.__name__,
-        law.__defaults__,
-        law.__closure__,
-    )
+        code or function.__code__, {**function.__globals__, **names}, function.__name__,
+        function.__defaults__, function.__closure__,
+    )  # fmt: skip
 
 
 def _as_real(value: object, real: type) -> object:
@@ -74,14 +68,7 @@ def _compiled_anew(compiled: Dispatcher) -> Dispatcher:
         for name, other in called.items()
         if isinstance(other, Dispatcher) and other is not compiled
     }
-    anew = FunctionType(
-        function.__code__,
-        known | others,
-        function.__name__,
-        function.__defaults__,
-        function.__closure__,
-    )
-    return njit(**compiled.targetoptions)(anew)
+    return njit(**compiled.targetoptions)(with_names(function, others))
 
 
 def product(laws: Sequence[tuple[Law, int]], real: type, offset: int = 0) -> Law:

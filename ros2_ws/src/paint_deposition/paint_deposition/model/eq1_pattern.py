@@ -199,14 +199,9 @@ class SetPoints(BaseModel):
 
 
 class Brush(SetPoints):
-    """The pattern of eq. (1) at one setting of the atomizer.
+    """The pattern of eq. (1) at one setting of the atomizer."""
 
-    Attributes:
-        number: by which programmes choose it, 1 to MOST.
-        planar: its pattern.
-    """
-
-    number: int = Field(ge=1, le=MOST)
+    number: int = Field(ge=1, le=MOST)  # by which programmes choose it
     planar: PlanarPattern
 
     @property

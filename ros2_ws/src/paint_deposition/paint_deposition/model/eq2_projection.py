@@ -29,6 +29,10 @@ class Projection(BaseModel):
         """Distance of the TCP from the part at which the part lies on the model plane [m]."""
         return self.model_plane_m - self.emission_offset_m
 
+    def widening(self, standoff_m: float) -> float:
+        """How many times wider the pattern is at a standoff [m] than on the model plane."""
+        return (standoff_m + self.emission_offset_m) / self.model_plane_m
+
     @property
     def nearest_m(self) -> float:
         """Distance from the emission point along the bell's axis up to which no paint lands [m].

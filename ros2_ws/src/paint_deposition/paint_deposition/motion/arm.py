@@ -7,25 +7,17 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Arm:
-    """J joints from a base to a tip.
+    """J joints from a base to a tip."""
 
-    Attributes:
-        joints: names of the joints.
-        frames: (J + 1, 4, 4) each joint at zero in the moved frame of the one before it, the first
-            in the base; the last is the tip in the frame of the last joint.
-        axes: (J, 3) unit axis of each joint in its frame.
-        slides: (J,) bool, whether it moves along its axis instead of turning about it.
-        lower, upper: (J,) limits [rad or m], infinite where there are none.
-        fastest: (J,) greatest speeds [rad/s or m/s], infinite where none is known.
-    """
-
-    joints: tuple[str, ...]
+    joints: tuple[str, ...]  # their names
+    # (J + 1, 4, 4) each joint at zero in the moved frame of the one before it, the first in the
+    # base; the last is the tip in the frame of the last joint.
     frames: np.ndarray
-    axes: np.ndarray
-    slides: np.ndarray
-    lower: np.ndarray
+    axes: np.ndarray  # (J, 3) unit axis of each joint in its frame
+    slides: np.ndarray  # (J,) bool, whether it moves along its axis instead of turning about it
+    lower: np.ndarray  # (J,) limits [rad or m], infinite where there are none, and upper (J,)
     upper: np.ndarray
-    fastest: np.ndarray
+    fastest: np.ndarray  # (J,) greatest speeds [rad/s or m/s], infinite where none is known
 
     def __len__(self) -> int:
         return len(self.joints)

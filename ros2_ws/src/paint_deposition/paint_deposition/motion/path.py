@@ -13,7 +13,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
+from paint_deposition.kernel.vectors import difference, length
 
 # A turn of the tool moves the far end of the spray; this lever turns it into a travel [m].
 LEVER_M = 0.3
@@ -53,18 +54,15 @@ def write_rotation(out, quaternion):
 
 
 @njit(cache=True)
-def _distance(p0, p1):
-    return math.sqrt((p1[0] - p0[0]) ** 2 + (p1[1] - p0[1]) ** 2 + (p1[2] - p0[2]) ** 2)
-
-
-@njit(cache=True)
+@named_for_its_code
 def spray_travel_m(p0, p1, q0, q1):
     """How far the spray travels between two poses, a turn of the tool included [m]."""
     dot = abs(q0[0] * q1[0] + q0[1] * q1[1] + q0[2] * q1[2] + q0[3] * q1[3])
-    return _distance(p0, p1) + LEVER_M * (2.0 * math.acos(min(dot, 1.0)))
+    return length(difference(p1, p0)) + LEVER_M * (2.0 * math.acos(min(dot, 1.0)))
 
 
 @njit(cache=True)
+@named_for_its_code
 def thin_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
     """Rows (K,) of the poses that are followed, the first among them; those behind the last wait.
 
@@ -79,9 +77,9 @@ def thin_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
     longest_ns, least_m = min(50_000_000, max_gap_ns), LEAST_SHARE * max_step_m
     for i in range(1, len(stamps_ns)):
         if last < i - 1:
-            by_it = _distance(positions[last], positions[i - 1])
-            by_it += _distance(positions[i - 1], positions[i])
-            detour_m = by_it - _distance(positions[last], positions[i])
+            to_it = length(difference(positions[i - 1], positions[last]))
+            by_it = to_it + length(difference(positions[i], positions[i - 1]))
+            detour_m = by_it - length(difference(positions[i], positions[last]))
             # A pose by which the way is longer than past it, by a tenth of such a travel, is a
             # corner and followed.
             if detour_m > 0.1 * least_m or stamps_ns[i] - stamps_ns[last] > max_gap_ns:
@@ -97,6 +95,7 @@ def thin_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
 
 
 @njit(cache=True)
+@named_for_its_code
 def split_segments(stamps_ns, positions, quaternions, cuts_ns, max_gap_ns, max_step_m):
     """Cut every segment at the trigger's changes and then into sub-steps of ``max_step_m`` at
     most.
@@ -158,48 +157,33 @@ def split_segments(stamps_ns, positions, quaternions, cuts_ns, max_gap_ns, max_s
 
 @dataclass(frozen=True)
 class SprayPath:
-    """Sub-steps of the motion in time order, one row each; the nodes of the film integral.
+    """Sub-steps of the motion in time order, one row each; the nodes of the film integral."""
 
-    Attributes:
-        stamp_ns: (M,) int64 middle of the sub-step.
-        time_s: (M,) the same since the motion began [s], NaN where that is not known.
-        dwell_s: (M,) its duration, the quadrature weight [s].
-        flow: (M,) flow relative to the calibrated one; 0 is gun off.
-        position_m: (M, 3) TCP [m].
-        rotation: (M, 3, 3) tool axes x, y, z as columns.
-        velocity_m_per_s: (M, 3) of the TCP [m/s].
-        pattern_shift_m: (M, 2) displacement of the pattern on the model plane, tool x, y [m].
-        stroke: (M,) int, number of the straight stroke; a new one starts where a turn of the path
-            shows, up to 40 mm behind it.
-        spray_pass: (M,) int, number of the spraying pass, -1 before the first.
-        passes_before: (M,) int, spraying passes of the same gun before that one.
-        open_flow: (M,) flow of the opening that runs or ran last; 1 before the first.
-        since_on_s, since_off_s: (M,) time since the trigger last opened and closed, inf if never
-            [s].
-        until_on_s, until_off_s: (M,) time until it next does within the stroke, inf if not.
-        from_turn_m, to_turn_m: (M,) distance along the path from the last turn and to the next.
-        brush: (M,) int, number of the brush of the opening that runs or ran last; 0 is the only
-            one, and before the first.
-    """
-
-    stamp_ns: np.ndarray
-    time_s: np.ndarray
-    dwell_s: np.ndarray
-    flow: np.ndarray
-    position_m: np.ndarray
-    rotation: np.ndarray
-    velocity_m_per_s: np.ndarray
-    pattern_shift_m: np.ndarray
+    stamp_ns: np.ndarray  # (M,) int64 middle of the sub-step
+    time_s: np.ndarray  # (M,) the same since the motion began [s], NaN where that is not known
+    dwell_s: np.ndarray  # (M,) its duration, the quadrature weight [s]
+    flow: np.ndarray  # (M,) flow relative to the calibrated one; 0 is gun off
+    position_m: np.ndarray  # (M, 3) TCP [m]
+    rotation: np.ndarray  # (M, 3, 3) tool axes x, y, z as columns
+    velocity_m_per_s: np.ndarray  # (M, 3) of the TCP [m/s]
+    pattern_shift_m: np.ndarray  # (M, 2) of the pattern on the model plane, tool x and y [m]
+    # (M,) int, number of the straight stroke; a new one starts where a turn of the path shows, up
+    # to 40 mm behind it.
     stroke: np.ndarray
-    spray_pass: np.ndarray
-    passes_before: np.ndarray
-    open_flow: np.ndarray
+    spray_pass: np.ndarray  # (M,) int, number of the spraying pass, -1 before the first
+    passes_before: np.ndarray  # (M,) int, spraying passes of the same gun before that one
+    open_flow: np.ndarray  # (M,) flow of the opening that runs or ran last; 1 before the first
+    # (M,) time since the trigger last opened and closed, inf if never [s].
     since_on_s: np.ndarray
     since_off_s: np.ndarray
+    # (M,) time until it next does within the stroke, inf if not [s].
     until_on_s: np.ndarray
     until_off_s: np.ndarray
+    # (M,) distance along the path from the last turn and to the next [m].
     from_turn_m: np.ndarray
     to_turn_m: np.ndarray
+    # (M,) int, number of the brush of the opening that runs or ran last; 0 is the only one, and
+    # before the first.
     brush: np.ndarray
 
     @staticmethod

@@ -3,15 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from paint_deposition.motion import strokes
 from paint_deposition.motion.path import SprayPath, split_segments, thin_poses
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen, TriggerChange, events_of
-from paint_deposition.motion.strokes import (
-    first_pass,
-    first_stroke,
-    follow_passes,
-    follow_strokes,
-    look_ahead,
-)
 from paint_deposition.motion.trajectory import (
     DEFAULT_MAX_POSE_GAP_S,
     ONLY_BRUSH,
@@ -91,17 +85,16 @@ class PathBuilder:
         self, stamps_ns: ArrayLike, positions_m: ArrayLike, quaternions_xyzw: ArrayLike
     ) -> None:
         """Take poses: (N,) int64, (N, 3) [m], (N, 4) scalar last."""
-        batch = PoseBatch(
-            np.asarray(stamps_ns, dtype=np.int64),
-            np.asarray(positions_m, dtype=float),
-            np.asarray(quaternions_xyzw, dtype=float),
-        )
+        batch = PoseBatch.of(stamps_ns, positions_m, quaternions_xyzw)
         continued, *restarted = self._screen.take(batch)
         self._waiting.append(continued)
         if self._stream_ns is None and len(continued):
             self._stream_ns = int(continued.stamps_ns[0])
         if len(continued) and continued.stamps_ns[-1] > self._restart_until_ns:
-            self._go_on()
+            # The stream has not restarted: changes that waited for that are of this one.
+            waited = self._flow.go_on()
+            if self._integrated_ns is not None:
+                self.counts.late_triggers += sum(stamp < self._integrated_ns for stamp in waited)
         for stream in restarted:
             ended_ns = int(PoseBatch.joined(self._waiting).stamps_ns[-1])
             within = self._stream_ns is not None and stream.stamps_ns[0] > self._stream_ns
@@ -132,19 +125,13 @@ class PathBuilder:
         stroke = path.stroke
         ready = len(path) if finish else int(np.searchsorted(stroke, stroke[-1], side='left'))
         # The last stroke's end shows with the first row of the next, which the look ahead needs.
-        until_on, until_off, to_turn = look_ahead(
+        until_on, until_off, to_turn = strokes.look_ahead(
             stroke, path.velocity_m_per_s, path.dwell_s, path.flow, path.since_on_s,
             path.from_turn_m,
         )  # fmt: skip
         complete = path.with_(until_on_s=until_on, until_off_s=until_off, to_turn_m=to_turn)
         self._finished = [path.select(slice(ready, None))]
         return complete.select(slice(0, ready))
-
-    def _go_on(self) -> None:
-        """The stream has not restarted: changes that waited for that are of this one."""
-        waited = self._flow.go_on()
-        if self._integrated_ns is not None:
-            self.counts.late_triggers += sum(stamp < self._integrated_ns for stamp in waited)
 
     def _cut_segments(self, until_ns: int | None, finish: bool) -> None:
         if not self._waiting:
@@ -191,16 +178,19 @@ class PathBuilder:
         """The path with its strokes and passes, and what lies behind each sub-step."""
         if self._states is None:
             flow_before = 0.0 if self._flow else 1.0
-            self._states = first_stroke(), first_pass(flow_before), first_trigger(flow_before)
+            of_pass = strokes.first_pass(flow_before)
+            self._states = strokes.first_stroke(), of_pass, first_trigger(flow_before)
             after_gap[0] = False  # Nothing came before the first.
-        strokes, passes, trigger = self._states
+        of_stroke, of_pass, of_trigger = self._states
         position, normal = path.position_m, path.rotation[:, :, 2]
-        stroke, from_turn, heading, step = follow_strokes(
-            strokes, position, normal, path.velocity_m_per_s, path.dwell_s, after_gap
+        stroke, from_turn, heading, step = strokes.follow_strokes(
+            of_stroke, position, normal, path.velocity_m_per_s, path.dwell_s, after_gap
         )
-        spray_pass = follow_passes(passes, position, normal, heading, step, path.flow, after_gap)
+        spray_pass = strokes.follow_passes(
+            of_pass, position, normal, heading, step, path.flow, after_gap
+        )
         open_flow, open_brush, since_on, since_off = follow_trigger(
-            trigger, path.dwell_s, path.flow, path.brush, after_gap
+            of_trigger, path.dwell_s, path.flow, path.brush, after_gap
         )
         if self._began_ns is None:
             self._began_ns = int(path.stamp_ns[0])

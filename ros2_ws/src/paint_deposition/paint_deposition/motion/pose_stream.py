@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from paint_deposition.motion.stream_quality import RepeatedSamples
 from paint_deposition.motion.trajectory import ONLY_BRUSH, PoseCounts, Trajectory
@@ -30,6 +31,16 @@ class PoseBatch:
     stamps_ns: np.ndarray
     positions_m: np.ndarray
     quaternions_xyzw: np.ndarray
+
+    @staticmethod
+    def of(
+        stamps_ns: ArrayLike, positions_m: ArrayLike, quaternions_xyzw: ArrayLike
+    ) -> 'PoseBatch':
+        """From any numbers of these shapes."""
+        stamps = np.asarray(stamps_ns, np.int64)
+        return PoseBatch(
+            stamps, np.asarray(positions_m, float), np.asarray(quaternions_xyzw, float)
+        )
 
     def __len__(self) -> int:
         return len(self.stamps_ns)
@@ -70,10 +81,7 @@ def events_of(
     The first change comes first: it says how the gun was before it. Of a part of the motion, what
     came after so many poses, ``until`` as many were there.
     """
-    batch = PoseBatch(
-        np.asarray(motion.stamps_ns, np.int64), np.asarray(motion.positions_m, float),
-        np.asarray(motion.quaternions_xyzw, float),
-    )  # fmt: skip
+    batch = PoseBatch.of(motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw)
     begin, end = max(after, 0), len(motion) if until is None else until
     came = np.zeros(len(motion.trigger_flow), np.int64)
     came[1:] = motion.trigger_rows[1:] if len(motion.trigger_rows) else 0

@@ -42,6 +42,7 @@ import math
 import numpy as np
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
+from paint_deposition.kernel.vectors import cross, difference, dot, length
 
 # The path's heading is judged over this travel, so that jitter at rest is no turn [m].
 HEADING_STEP_M = 0.01
@@ -49,18 +50,6 @@ HEADING_STEP_M = 0.01
 COS_TURN = 0.5
 # A sharp turn is noticed at most so far behind it, after two heading steps [m].
 LATEST_NOTICE_M = 0.04
-
-
-@njit
-def dot(a, b):
-    """Scalar product of two vectors (3,)."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit
-def difference(a, b):
-    """Vector (3,) from b to a, as three numbers: arrays take seconds to compile."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @njit
@@ -73,17 +62,13 @@ def cosine(a, b):
 @njit
 def carry(vector, before, after):
     """Turn a vector (3,) by the smallest rotation from one unit normal to the next, in place."""
-    wx = before[1] * after[2] - before[2] * after[1]
-    wy = before[2] * after[0] - before[0] * after[2]
-    wz = before[0] * after[1] - before[1] * after[0]
-    cos = dot(before, after)
+    axis, cos = cross(before, after), dot(before, after)
     if cos < -0.99:  # The tool was turned over at once: no rotation is the smallest.
         return
-    x, y, z = vector[0], vector[1], vector[2]
-    cx, cy, cz = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x
-    vector[0] = x + cx + (wy * cz - wz * cy) / (1.0 + cos)
-    vector[1] = y + cy + (wz * cx - wx * cz) / (1.0 + cos)
-    vector[2] = z + cz + (wx * cy - wy * cx) / (1.0 + cos)
+    once = cross(axis, vector)
+    twice = cross(axis, once)
+    for k in range(3):
+        vector[k] = vector[k] + once[k] + twice[k] / (1.0 + cos)
 
 
 @njit
@@ -117,21 +102,20 @@ def first_stroke() -> np.ndarray:
 @njit
 def _advance(state, position):
     """Follow the path to its next position; length of the heading step that ends here, or 0."""
-    moved = difference(position, state.position)
-    travel = math.sqrt(dot(moved, moved))
+    travel = length(difference(position, state.position))
     state.since_anchor_m += travel
     state.since_earlier_m += travel
     step = difference(position, state.anchor)
-    length = math.sqrt(dot(step, step))
+    step_m = length(step)
     for k in range(3):
         state.position[k] = position[k]
-        if length >= HEADING_STEP_M:
-            state.heading[k] = step[k] / length
-    return length if length >= HEADING_STEP_M else 0.0
+        if step_m >= HEADING_STEP_M:
+            state.heading[k] = step[k] / step_m
+    return step_m if step_m >= HEADING_STEP_M else 0.0
 
 
 @njit
-def _take_step(state, length):
+def _take_step(state, step_m):
     """Take a heading step into the stroke, or begin the next stroke with it: true if it turns."""
     turns = state.length_m > 0.0 and leaves(state.heading, state.mean, state.carried)
     if turns:
@@ -145,8 +129,8 @@ def _take_step(state, length):
         detour = state.since_earlier_m - along
         behind = (square - along**2 + detour**2) / (2.0 * detour) if detour > 0.0 else 0.0
         state.from_turn_m = min(behind, state.since_earlier_m, LATEST_NOTICE_M)
-    state.length_m += length
-    take_in(state.heading, length, state.length_m, state.mean, state.carried)
+    state.length_m += step_m
+    take_in(state.heading, step_m, state.length_m, state.mean, state.carried)
     state.since_earlier_m, state.since_anchor_m = state.since_anchor_m, 0.0
     for k in range(3):
         state.earlier[k], state.anchor[k] = state.anchor[k], state.position[k]
@@ -154,6 +138,7 @@ def _take_step(state, length):
 
 
 @njit(cache=True)
+@named_for_its_code
 def follow_strokes(states, position, normal, velocity, dwell, after_gap):
     """Number the strokes and measure back along the path to where each began.
 
@@ -169,8 +154,7 @@ def follow_strokes(states, position, normal, velocity, dwell, after_gap):
     heading, step = np.empty((count, 3)), np.zeros(count)
     state = states[0]
     for i in range(count):
-        v = velocity[i]
-        half_step = 0.5 * dwell[i] * math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+        half_step = 0.5 * dwell[i] * length(velocity[i])
         carry(state.carried, state.normal, normal[i])
         if state.number < 0 or after_gap[i]:
             # A stroke of unknown heading, as at the start and behind a gap.
@@ -192,6 +176,7 @@ def follow_strokes(states, position, normal, velocity, dwell, after_gap):
 
 
 @njit(cache=True)
+@named_for_its_code
 def look_ahead(stroke, velocity, dwell, flow, since_on, from_turn):
     """Measure forward to the next trigger change and turn, within whole strokes.
 
@@ -202,8 +187,7 @@ def look_ahead(stroke, velocity, dwell, flow, since_on, from_turn):
     until_on, until_off, to_turn = np.empty(count), np.empty(count), np.empty(count)
     on, off, turn, behind_m = np.inf, np.inf, 0.0, 0.0
     for i in range(count - 1, -1, -1):
-        v = velocity[i]
-        step = dwell[i] * math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+        step = dwell[i] * length(velocity[i])
         if i == count - 1 or stroke[i + 1] != stroke[i]:
             # The gun may close at the very turn; a gap closes it, and it opens again behind it.
             closed = i == count - 1 or flow[i + 1] == 0.0 or since_on[i + 1] < dwell[i + 1]

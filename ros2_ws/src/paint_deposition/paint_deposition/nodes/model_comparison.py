@@ -11,7 +11,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
-from paint_deposition.film.colour_scales import ColourScale, residual_scale
 from paint_deposition.inference.comparison.regions import interpolation_matrix, reached
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.gauge_noise import gauge_noise
@@ -28,6 +27,7 @@ from paint_deposition.nodes.runtime.parameters import CONFIGURED, NodeParameter,
 from paint_deposition.nodes.runtime.topics import ColouredMesh, header
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, turned
+from paint_deposition.report.colour_scales import ColourScale, residual_scale
 
 
 class ModelComparison(PaintingNode):

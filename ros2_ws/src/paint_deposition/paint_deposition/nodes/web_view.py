@@ -18,7 +18,6 @@ from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField,
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns, transforms_of, trigger_change
-from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
@@ -37,7 +36,8 @@ from paint_deposition.nodes.runtime.parameters import (
 )
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
 from paint_deposition.part.surface import turned
-from paint_deposition.report.live.page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page, Scene
+from paint_deposition.report.colour_scales import film_scale
+from paint_deposition.report.live_page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page, Scene
 
 
 class WebView(PaintNode):

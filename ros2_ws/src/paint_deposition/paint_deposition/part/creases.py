@@ -6,16 +6,15 @@ import numpy as np
 import scipy
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
+from paint_deposition.kernel.vectors import cross, difference, dot, length
 from paint_deposition.part.edges import (
     BLOCK,
     Edges,
+    connected,
     cut_segments,
     half_edges_m,
-    join,
     near_pairs,
     next_half_edge,
-    numbered,
-    patch_of_vertex,
     without_seams,
 )
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
@@ -32,18 +31,17 @@ LEAST_ERROR = 5e-4
 
 
 @njit(cache=True, nogil=True)
+@named_for_its_code
 def folds_rad(vertices, faces, normals, paired):
     """(E,) angle between the two triangles of each paired edge, positive if convex [rad]."""
     folds = np.empty(len(paired))
     for e in range(len(paired)):
         f, k = paired[e, 0] // 3, paired[e, 0] % 3
-        a, b, c = normals[f]
-        u, v, w = normals[paired[e, 1] // 3]
-        x, y, z = b * w - c * v, c * u - a * w, a * v - b * u
-        angle = np.arctan2(np.sqrt(x * x + y * y + z * z), a * u + b * v + c * w)
-        start, end = vertices[faces[f, k]], vertices[faces[f, (k + 1) % 3]]
-        along = x * (end[0] - start[0]) + y * (end[1] - start[1]) + z * (end[2] - start[2])
-        folds[e] = angle if along >= 0.0 else -angle
+        one, other = normals[f], normals[paired[e, 1] // 3]
+        axis = cross(one, other)
+        angle = np.arctan2(length(axis), dot(one, other))
+        along = difference(vertices[faces[f, (k + 1) % 3]], vertices[faces[f, k]])
+        folds[e] = angle if dot(axis, along) >= 0.0 else -angle
     return folds
 
 
@@ -66,10 +64,10 @@ def rim_folds(
     if not len(rows):
         return rim
     along = ends_m[:, 1] - ends_m[:, 0]
-    length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
-    along = along / length[:, None]
+    lengths_m = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
+    along = along / lengths_m[:, None]
     pieces, whose = cut_segments(ends_m, 0.005)
-    half = 0.5 * (length / np.bincount(whose))[whose]
+    half = 0.5 * (lengths_m / np.bincount(whose))[whose]
     middle = pieces.mean(axis=1)
     fold = folds[rows]
     turn = fold[whose]
@@ -94,23 +92,14 @@ def split_at_creases(
     Returned are (W,) the vertex each new vertex is a copy of, and (F, 3) faces on the new
     vertices.
     """
-    corners = np.arange(faces.size, dtype=np.int32)
-    _join_corners(corners, edges.paired, smooth)
-    count, label = numbered(corners)
+    # The corners at both ends of smooth edges hang together.
+    one, other = edges.paired[smooth].T
+    starts = np.stack([one, next_half_edge(other)], axis=1)
+    ends = np.stack([next_half_edge(one), other], axis=1)
+    count, label = connected(np.concatenate([starts, ends]), faces.size)
     origin = np.empty(count, dtype=np.int64)
     origin[label] = faces.ravel()
     return origin, label.reshape(-1, 3)
-
-
-@njit(cache=True, nogil=True)
-@named_for_its_code
-def _join_corners(corners, paired, smooth):
-    """Make the corners at both ends of smooth edges hang together."""
-    for e in range(len(paired)):
-        if smooth[e]:
-            one, other = paired[e]
-            join(corners, one, other // 3 * 3 + (other + 1) % 3)
-            join(corners, one // 3 * 3 + (one + 1) % 3, other)
 
 
 def rim_segments_m(
@@ -132,7 +121,7 @@ def strip_vertices(
     """
     if not len(hem_half_edges):
         return np.zeros(len(vertices_m), dtype=bool)
-    patch = patch_of_vertex(patches, len(vertices_m))
+    _, patch = connected(patches, len(vertices_m))
     length_m = edge_lengths_m(vertices_m, patches).ravel()[hem_half_edges]
     of_face = patch[patches[:, 0]]
     border = np.bincount(of_face[hem_half_edges // 3], length_m, minlength=patch.max() + 1)
@@ -145,7 +134,7 @@ def carried_over(flagged: np.ndarray, fine: np.ndarray, count: int) -> np.ndarra
     """(count,) bool: the flag of patches' first vertices, for all vertices of the refined ones."""
     if not flagged.any():
         return np.zeros(count, dtype=bool)
-    patch = patch_of_vertex(fine, count)
+    _, patch = connected(fine, count)
     return np.bincount(patch[: len(flagged)], flagged, minlength=patch.max() + 1)[patch] > 0
 
 

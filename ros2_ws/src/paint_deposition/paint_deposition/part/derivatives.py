@@ -6,7 +6,8 @@ import numpy as np
 import scipy
 
 from paint_deposition.kernel.blocks import shared_among_threads
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
+from paint_deposition.kernel.vectors import cross, difference, dot, length
 from paint_deposition.part.creases import RIM_FOLD_RAD
 from paint_deposition.part.edges import near_pairs, rows_by_number
 from paint_deposition.part.refinement import face_areas_m2, face_normals
@@ -38,27 +39,20 @@ def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
+@named_for_its_code
 def _mean_normal(vertices, faces, corners, out):
-    ahead, behind, across = np.empty(3), np.empty(3), np.empty(3)
-    for axis in range(3):
-        out[axis] = 0.0
+    out[:] = 0.0
     for c in corners:
         f, k = c // 3, c % 3
-        here = faces[f, k]
+        here = vertices[faces[f, k]]
+        ahead = difference(vertices[faces[f, (k + 1) % 3]], here)
+        behind = difference(vertices[faces[f, (k + 2) % 3]], here)
+        across = cross(ahead, behind)
+        size = length(across)
+        angle = math.atan2(size, dot(ahead, behind))
         for axis in range(3):
-            ahead[axis] = vertices[faces[f, (k + 1) % 3], axis] - vertices[here, axis]
-            behind[axis] = vertices[faces[f, (k + 2) % 3], axis] - vertices[here, axis]
-        for axis in range(3):
-            i, j = (axis + 1) % 3, (axis + 2) % 3
-            across[axis] = ahead[i] * behind[j] - ahead[j] * behind[i]
-        length = math.sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2])
-        cosine = ahead[0] * behind[0] + ahead[1] * behind[1] + ahead[2] * behind[2]
-        angle = math.atan2(length, cosine)
-        for axis in range(3):
-            out[axis] += angle * (across[axis] / length)
-    length = max(math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]), 1e-12)
-    for axis in range(3):
-        out[axis] /= length
+            out[axis] += angle * (across[axis] / size)
+    out /= max(length(out), 1e-12)
 
 
 @njit(cache=True, nogil=True)
@@ -82,10 +76,13 @@ def _gather(faces, first, corner, v, seen, passed, near):
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
+@named_for_its_code
 def _equations(vertices, v, normal, near, system):
-    """Fill ``system`` (5, 6) with the normal equations of the parabola over the plane at v."""
-    n0, n1, n2 = normal[0], normal[1], normal[2]
-    # Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017.
+    """Fill ``system`` (5, 6) with the normal equations of the parabola over the plane at v.
+
+    Returns unit vectors that make a right-handed frame with the normal, as ``tangents``.
+    """
+    n0, n1, n2 = normal
     sign = math.copysign(1.0, n2)
     a = -1.0 / (sign + n2)
     b = n0 * n1 * a
@@ -93,26 +90,20 @@ def _equations(vertices, v, normal, near, system):
     second = (b, sign + n1 * n1 * a, -n1)
     farthest2 = 0.0
     for w in near:
-        o0 = vertices[w, 0] - vertices[v, 0]
-        o1 = vertices[w, 1] - vertices[v, 1]
-        o2 = vertices[w, 2] - vertices[v, 2]
-        farthest2 = max(farthest2, o0 * o0 + o1 * o1 + o2 * o2)
+        offset = difference(vertices[w], vertices[v])
+        farthest2 = max(farthest2, dot(offset, offset))
     size = math.sqrt(farthest2)
     terms = np.empty(TERMS + 1)
-    for i in range(TERMS):
-        for j in range(TERMS + 1):
-            system[i, j] = 0.0
+    system[:] = 0.0
     for w in near:
-        o0 = (vertices[w, 0] - vertices[v, 0]) / size
-        o1 = (vertices[w, 1] - vertices[v, 1]) / size
-        o2 = (vertices[w, 2] - vertices[v, 2]) / size
-        x = first[0] * o0 + first[1] * o1 + first[2] * o2
-        y = second[0] * o0 + second[1] * o1 + second[2] * o2
+        away = difference(vertices[w], vertices[v])
+        offset = (away[0] / size, away[1] / size, away[2] / size)
+        x, y = dot(first, offset), dot(second, offset)
         terms[0], terms[1] = x, y
         terms[2], terms[3], terms[4] = 0.5 * x * x, x * y, 0.5 * y * y
-        terms[5] = n0 * o0 + n1 * o1 + n2 * o2
+        terms[5] = dot(normal, offset)
         # Near vertices shape the parabola by far the most.
-        weight = math.exp(-12.0 * (o0 * o0 + o1 * o1 + o2 * o2))
+        weight = math.exp(-12.0 * dot(offset, offset))
         for i in range(TERMS):
             share = weight * terms[i]
             for j in range(i, TERMS + 1):
@@ -131,8 +122,7 @@ def _solved(system, work):
         for j in range(TERMS):
             size2 += system[i, j] * system[i, j]
             work[i, TERMS + 1 + j] = 1.0 if i == j else 0.0
-        for j in range(TERMS + 1):
-            work[i, j] = system[i, j]
+    work[:, : TERMS + 1] = system
     for k in range(TERMS):
         pivot = k
         for i in range(k + 1, TERMS):
@@ -158,6 +148,7 @@ def _solved(system, work):
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
+@named_for_its_code
 def _fill(vertices, faces, first, corner, start, stop, normals):
     """Set the normals of vertices from start to stop."""
     seen = np.zeros(len(vertices), dtype=np.int32)

@@ -100,53 +100,35 @@ def half_edges_m(vertices_m: np.ndarray, faces: np.ndarray, half_edges: np.ndarr
     return vertices_m[np.stack([corners[half_edges], corners[next_half_edge(half_edges)]], axis=1)]
 
 
-def connected(pairs: np.ndarray, count: int) -> tuple[int, np.ndarray]:
-    """How many groups (P, 2) pairs make of ``count`` members, and (count,) the group of each.
+def connected(rows: np.ndarray, count: int) -> tuple[int, np.ndarray]:
+    """How many groups of ``count`` members rows (P, K) make, and (count,) the group of each.
 
-    Groups are numbered in the order of their first members.
+    Members in one row, the ends of an edge or the corners of a face, are of one group. Groups are
+    numbered in the order of their first members.
     """
-    parents = np.arange(count, dtype=np.int32)
-    _join_pairs(parents, np.ascontiguousarray(pairs, dtype=np.int64))
-    return numbered(parents)
+    return _connected(np.ascontiguousarray(rows, dtype=np.int64), count)
 
 
 @njit(cache=True, nogil=True)
-def join(parents, one, other):
-    """Make two members hang from the first of all that they are joined to."""
-    while parents[one] != one:
-        parents[one] = parents[parents[one]]
-        one = parents[one]
-    while parents[other] != other:
-        parents[other] = parents[parents[other]]
-        other = parents[other]
-    parents[max(one, other)] = min(one, other)
-
-
-@njit(cache=True, nogil=True)
-def numbered(parents):
-    """How many groups there are of what was joined, and the number of each member's."""
-    count, group = 0, np.empty(len(parents), dtype=np.int64)
-    for member in range(len(parents)):
+def _connected(rows, count):
+    # Members hang from the first of all that they are joined to.
+    parents = np.arange(count).astype(np.int32)
+    for row in rows:
+        for k in range(1, len(row)):
+            one, other = row[0], row[k]
+            while parents[one] != one:
+                parents[one] = parents[parents[one]]
+                one = parents[one]
+            while parents[other] != other:
+                parents[other] = parents[parents[other]]
+                other = parents[other]
+            parents[max(one, other)] = min(one, other)
+    groups, group = 0, np.empty(count, dtype=np.int64)
+    for member in range(count):
         # A parent comes before its children.
-        group[member] = count if parents[member] == member else group[parents[member]]
-        count += parents[member] == member
-    return count, group
-
-
-@njit(cache=True, nogil=True)
-def _join_pairs(parents, pairs):
-    for row in range(len(pairs)):
-        join(parents, pairs[row, 0], pairs[row, 1])
-
-
-@njit(cache=True, nogil=True)
-def patch_of_vertex(faces, count):
-    """(count,) number of the connected patch of triangles (F, 3) that each vertex is of."""
-    vertices = np.arange(count, dtype=np.int32)
-    for f in range(len(faces)):
-        join(vertices, faces[f, 0], faces[f, 1])
-        join(vertices, faces[f, 0], faces[f, 2])
-    return numbered(vertices)[1]
+        group[member] = groups if parents[member] == member else group[parents[member]]
+        groups += parents[member] == member
+    return groups, group
 
 
 def near_pairs(
@@ -270,7 +252,7 @@ def equal_rows(bits):
 
 def coarse_faces(vertices_m: np.ndarray, faces: np.ndarray, cell_m: float) -> np.ndarray:
     """(C, 3) triangles of a picture: of each patch one vertex (V, 3) a cell [m] stands for all."""
-    patch = patch_of_vertex(faces, len(vertices_m))
+    _, patch = connected(faces, len(vertices_m))
     cells = ((vertices_m - vertices_m.min(axis=0)) / cell_m).astype(np.int64)
     cells[:, 0] += patch * (cells[:, 0].max() + 1)
     first, cell = equal_rows(cells)

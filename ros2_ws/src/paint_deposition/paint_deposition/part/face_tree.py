@@ -10,6 +10,7 @@ import numpy as np
 
 from paint_deposition.kernel.blocks import bounding_box_m
 from paint_deposition.kernel.compiler import named_for_its_code, njit
+from paint_deposition.kernel.vectors import cross, difference, dot, length
 
 # Faces in a leaf of the tree.
 LEAF = 8
@@ -60,24 +61,16 @@ def _places_on_the_curve(vertices, faces, low, scale):
 
 
 @njit(cache=True, nogil=True)
-def support(node, x, y, z):
+@named_for_its_code
+def support(node, way):
     """How far a node reaches from its centre along a unit vector [m]."""
-    along = min(1.0, abs(node[NORMAL] * x + node[NORMAL + 1] * y + node[NORMAL + 2] * z))
+    along = min(1.0, abs(dot(node[NORMAL:THICKNESS], way)))
     across = math.sqrt(1.0 - along * along)
     return min(node[RADIUS], along * node[THICKNESS] + across * node[RADIUS])
 
 
 @njit(cache=True, nogil=True)
-def _along_normal(node, place):
-    """How far a place lies from a node's centre along its normal [m]."""
-    return (
-        (place[0] - node[0]) * node[NORMAL]
-        + (place[1] - node[1]) * node[NORMAL + 1]
-        + (place[2] - node[2]) * node[NORMAL + 2]
-    )
-
-
-@njit(cache=True, nogil=True)
+@named_for_its_code
 def _nodes(vertices, faces, leaves):
     """(2 L - 1, 11) boxes around all nodes, and slabs around what is in them."""
     nodes = np.zeros((2 * leaves - 1, NODE))
@@ -85,18 +78,17 @@ def _nodes(vertices, faces, leaves):
     areas = np.zeros((len(nodes), 3))
     for node in range(len(nodes) - 1, -1, -1):
         at, leaf = nodes[node], node - (leaves - 1)
+        normal = at[NORMAL:THICKNESS]
         inner = leaf < 0
         first = 0 if inner else len(faces) * leaf // leaves
         last = 0 if inner else len(faces) * (leaf + 1) // leaves
         for f in range(first, last):
-            a, b, c = faces[f]
+            a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
+            area = cross(difference(b, a), difference(c, a))
             for k in range(3):
-                low[node, k] = min(low[node, k], vertices[a, k], vertices[b, k], vertices[c, k])
-                high[node, k] = max(high[node, k], vertices[a, k], vertices[b, k], vertices[c, k])
-                i, j = (k + 1) % 3, (k + 2) % 3
-                areas[node, k] += (vertices[b, i] - vertices[a, i]) * (
-                    vertices[c, j] - vertices[a, j]
-                ) - (vertices[b, j] - vertices[a, j]) * (vertices[c, i] - vertices[a, i])
+                low[node, k] = min(low[node, k], a[k], b[k], c[k])
+                high[node, k] = max(high[node, k], a[k], b[k], c[k])
+                areas[node, k] += area[k]
         children = range(2 * node + 1, 2 * node + 3 if inner else 2 * node + 1)
         for child in children:
             for k in range(3):
@@ -111,13 +103,14 @@ def _nodes(vertices, faces, leaves):
             area2 += areas[node, k] ** 2
         at[RADIUS] = math.sqrt(squared)
         for k in range(3):
-            at[NORMAL + k] = areas[node, k] / math.sqrt(area2)
+            normal[k] = areas[node, k] / math.sqrt(area2)
         for f in range(first, last):
             for corner in faces[f]:
-                at[THICKNESS] = max(at[THICKNESS], abs(_along_normal(at, vertices[corner])))
+                away = abs(dot(difference(vertices[corner], at), normal))
+                at[THICKNESS] = max(at[THICKNESS], away)
         for child in children:
-            reach = support(nodes[child], at[NORMAL], at[NORMAL + 1], at[NORMAL + 2])
-            at[THICKNESS] = max(at[THICKNESS], abs(_along_normal(at, nodes[child])) + reach)
+            away = abs(dot(difference(nodes[child], at), normal))
+            at[THICKNESS] = max(at[THICKNESS], away + support(nodes[child], normal))
         at[THICKNESS] = min(at[THICKNESS], at[RADIUS])
     return nodes
 
@@ -166,23 +159,22 @@ def _box_entry(p, way, node):
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
+@named_for_its_code
 def _face_hit(p, way, vertices, face):
     """How far along a ray from p it meets a triangle, its border included; inf: never.
 
     Möller and Trumbore, Fast, minimum storage ray/triangle intersection, 1997.
     """
-    a, b, c = vertices[face[0]], vertices[face[1]], vertices[face[2]]
-    x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    u, v, w = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    i, j, k = way[1] * w - way[2] * v, way[2] * u - way[0] * w, way[0] * v - way[1] * u
-    determinant = x * i + y * j + z * k
+    a = vertices[face[0]]
+    to_b, to_c = difference(vertices[face[1]], a), difference(vertices[face[2]], a)
+    across = cross(way, to_c)
+    determinant = dot(to_b, across)
     if determinant == 0.0:
         return np.inf
-    r, s, t = p[0] - a[0], p[1] - a[1], p[2] - a[2]
-    of_b = (r * i + s * j + t * k) / determinant
-    e, g, h = s * z - t * y, t * x - r * z, r * y - s * x
-    of_c = (way[0] * e + way[1] * g + way[2] * h) / determinant
-    hit = (u * e + v * g + w * h) / determinant
+    to_p = difference(p, a)
+    of_b = dot(to_p, across) / determinant
+    beside = cross(to_p, to_b)
+    of_c, hit = dot(way, beside) / determinant, dot(to_c, beside) / determinant
     inside = min(of_b, of_c, 1.0 - of_b - of_c) >= -1e-9
     return hit if inside and hit >= 0.0 else np.inf
 
@@ -275,19 +267,15 @@ def locate(
 
 
 @njit(cache=True, nogil=True)
+@named_for_its_code
 def closest_place(a, b, c, p):
     """The place on a triangle that is closest to a point; all are (x, y, z).
 
     Ericson, Real-Time Collision Detection (2005), section 5.1.5.
     """
-    abx, aby, abz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    acx, acy, acz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    apx, apy, apz = p[0] - a[0], p[1] - a[1], p[2] - a[2]
-    d1 = abx * apx + aby * apy + abz * apz
-    d2 = acx * apx + acy * apy + acz * apz
-    abab = abx * abx + aby * aby + abz * abz
-    abac = abx * acx + aby * acy + abz * acz
-    acac = acx * acx + acy * acy + acz * acz
+    ab, ac, ap = difference(b, a), difference(c, a), difference(p, a)
+    d1, d2 = dot(ab, ap), dot(ac, ap)
+    abab, abac, acac = dot(ab, ab), dot(ab, ac), dot(ac, ac)
     # The same from b and from c, and the areas of the triangles that the point makes.
     d3, d4, d5, d6 = d1 - abab, d2 - abac, d1 - abac, d2 - acac
     of_a, of_b, of_c = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
@@ -307,12 +295,11 @@ def closest_place(a, b, c, p):
     else:
         area = of_a + of_b + of_c
         v, w = of_b / area, of_c / area
-    return a[0] + v * abx + w * acx, a[1] + v * aby + w * acy, a[2] + v * abz + w * acz
-
-
-@njit(cache=True, nogil=True)
-def _corner(values, v):
-    return values[v, 0], values[v, 1], values[v, 2]
+    return (
+        a[0] + v * ab[0] + w * ac[0],
+        a[1] + v * ab[1] + w * ac[1],
+        a[2] + v * ab[2] + w * ac[2],
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -325,7 +312,7 @@ def _find(points, wanted, least, vertices, normals, faces, nodes, found, places)
     inner = len(nodes) // 2
     waiting, away = np.empty(DEPTH, dtype=np.int64), np.empty(DEPTH)
     for i in range(len(points)):
-        p, nearest = _corner(points, i), np.inf
+        p, nearest = points[i], np.inf
         waiting[0], away[0], left = 0, 0.0, 1
         while left:
             left -= 1
@@ -339,10 +326,8 @@ def _find(points, wanted, least, vertices, normals, faces, nodes, found, places)
                 continue
             for f in range(*leaf_faces(nodes, faces, node)):
                 a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-                x, y, z = closest_place(
-                    _corner(vertices, a), _corner(vertices, b), _corner(vertices, c), p
-                )
-                distance = np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2)
+                place = closest_place(vertices[a], vertices[b], vertices[c], p)
+                distance = length(difference(place, p))
                 if distance < nearest:
                     agreement = 0.0
                     for k in range(3):
@@ -352,4 +337,4 @@ def _find(points, wanted, least, vertices, normals, faces, nodes, found, places)
                         distance += THICKNESS_M
                 if distance < nearest:
                     nearest, found[i] = distance, f
-                    places[i, 0], places[i, 1], places[i, 2] = x, y, z
+                    places[i, 0], places[i, 1], places[i, 2] = place

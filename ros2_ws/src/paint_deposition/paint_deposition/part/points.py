@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from paint_deposition.kernel.blocks import Blocks, bounding_box_m
+from paint_deposition.kernel.blocks import Blocks, bounding_box_m, box_centre_m
 from paint_deposition.part.orientation import outward_side
 
 DOWN = (0.0, 0.0, -1.0)
@@ -142,18 +142,8 @@ class SurfacePoints:
         return value
 
 
-def box_centre_m(positions_m: np.ndarray) -> np.ndarray:
-    """(3,) centre of the bounding box of (V, 3) points [m]."""
-    if not len(positions_m):
-        return np.zeros(3)
-    low, high = bounding_box_m(positions_m)
-    return 0.5 * (low + high)
-
-
 def box_extent_m(positions_m: np.ndarray) -> np.ndarray:
     """(3,) sides of the bounding box of (V, 3) points [m]."""
-    if not len(positions_m):
-        return np.zeros(3)
     low, high = bounding_box_m(positions_m)
     return high - low
 

@@ -6,7 +6,8 @@ from functools import lru_cache
 import numpy as np
 
 from paint_deposition.errors import MeshError
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
+from paint_deposition.kernel.vectors import cross, difference, length
 from paint_deposition.part.edges import edges_of
 
 
@@ -125,27 +126,27 @@ def _double(vertices_m: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True)
+@named_for_its_code
 def _edge_lengths(vertices, faces):
     lengths = np.empty(faces.shape)
     for f in range(len(faces)):
         for k in range(3):
             a, b = vertices[faces[f, k]], vertices[faces[f, (k + 1) % 3]]
-            x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-            lengths[f, k] = np.sqrt(x * x + y * y + z * z)
+            lengths[f, k] = length(difference(b, a))
     return lengths
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
+@named_for_its_code
 def _areas_and_normals(vertices, faces):
     areas, normals = np.empty(len(faces)), np.empty((len(faces), 3))
     for f in range(len(faces)):
         a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-        x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        u, v, w = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        i, j, k = y * w - z * v, z * u - x * w, x * v - y * u
-        twice = np.sqrt(i * i + j * j + k * k)
+        across = cross(difference(b, a), difference(c, a))
+        twice = length(across)
         areas[f] = 0.5 * twice
-        normals[f, 0], normals[f, 1], normals[f, 2] = i / twice, j / twice, k / twice
+        for k in range(3):
+            normals[f, k] = across[k] / twice
     return areas, normals
 
 

@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.kernel.blocks import neighbours_together, shared_among_threads
+from paint_deposition.kernel.blocks import (
+    box_centre_m,
+    neighbours_together,
+    shared_among_threads,
+)
 from paint_deposition.part import creases, derivatives
 from paint_deposition.part.creases import NO_EDGES, CurvedEdges
-from paint_deposition.part.derivatives import surface_normals
 from paint_deposition.part.edges import Edges, edge_distance_m
 from paint_deposition.part.face_tree import FaceTree, Location, first_hits, locate
 from paint_deposition.part.orientation import (
@@ -21,7 +24,7 @@ from paint_deposition.part.orientation import (
     mean_normal,
     outward_side,
 )
-from paint_deposition.part.points import SurfacePoints, box_centre_m, box_extent_m, heights
+from paint_deposition.part.points import SurfacePoints, box_extent_m, heights
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, face_normals, refine
 from paint_deposition.part.visibility import Occluder
 
@@ -96,7 +99,7 @@ class Surface:
         rim_m = creases.rim_segments_m(vertices_m, faces, edges, rim)
         strip = creases.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
         corners = vertices_m[origin]
-        read_normals = surface_normals(corners, patches)
+        read_normals = derivatives.surface_normals(corners, patches)
         unjoined = edges.paired[~smooth, 1], edges.clashing.ravel(), edges.single
         half_edges = np.concatenate([edges.paired[:, 0], *unjoined])
         curved_edges = CurvedEdges.of(corners, read_normals, patches, half_edges)
@@ -109,17 +112,10 @@ class Surface:
             notes = (*notes, guess) if guess else notes
         down = np.asarray(down, dtype=np.float64)
         return Surface(
-            vertices,
-            fine,
-            normals,
-            vertex_areas,
-            down / np.linalg.norm(down),
-            rim_m,
-            notes,
+            vertices, fine, normals, vertex_areas, down / np.linalg.norm(down), rim_m, notes,
             in_hem=creases.carried_over(strip, fine, len(vertices)),
-            curved_edges=curved_edges,
-            neighbours=neighbours_together(vertices),
-        )
+            curved_edges=curved_edges, neighbours=neighbours_together(vertices),
+        )  # fmt: skip
 
     @cached_property
     def mesh_id(self) -> str:

@@ -9,8 +9,9 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from paint_deposition.kernel.blocks import shared_among_threads
+from paint_deposition.kernel.blocks import box_centre_m, shared_among_threads
 from paint_deposition.kernel.compiler import named_for_its_code, njit
+from paint_deposition.kernel.vectors import cross, difference, dot
 from paint_deposition.part.derivatives import tangents
 from paint_deposition.part.face_tree import (
     DEPTH,
@@ -20,7 +21,6 @@ from paint_deposition.part.face_tree import (
     support,
     wait,
 )
-from paint_deposition.part.points import box_centre_m
 
 # Lower horizons count as this one [sine]: hardly any paint comes from there.
 LEAST_SINE = 0.05
@@ -31,18 +31,17 @@ HIGH_SINE = 0.8
 
 
 @njit(cache=True, nogil=True)
-def _edge_sine(ax, ay, az, ah, bx, by, bz, bh):
+@named_for_its_code
+def _edge_sine(a, ah, b, bh):
     """Highest sine of elevation along an edge from a to b, seen from the origin.
 
     ``ah`` and ``bh`` are the heights of a and b over the plane at the origin.
     """
-    best = -1.0
-    a2 = ax * ax + ay * ay + az * az
+    best, a2 = -1.0, dot(a, a)
     if a2 > TOUCHING_M * TOUCHING_M:
         best = ah / math.sqrt(a2)
-    ex, ey, ez, eh = bx - ax, by - ay, bz - az, bh - ah
-    e2 = ex * ex + ey * ey + ez * ez
-    ae = ax * ex + ay * ey + az * ez
+    edge, eh = difference(b, a), bh - ah
+    e2, ae = dot(edge, edge), dot(a, edge)
     below = eh * ae - ah * e2
     if below != 0.0:
         # Where height over distance is level along the edge.
@@ -55,38 +54,28 @@ def _edge_sine(ax, ay, az, ah, bx, by, bz, bh):
 
 
 @njit(cache=True, nogil=True)
+@named_for_its_code
 def _face_sine(p, n, vertices, face):
     """Highest sine of elevation of a triangle over the plane at p with unit normal n."""
-    i, j, k = face[0], face[1], face[2]
-    ax, ay, az = vertices[i, 0] - p[0], vertices[i, 1] - p[1], vertices[i, 2] - p[2]
-    bx, by, bz = vertices[j, 0] - p[0], vertices[j, 1] - p[1], vertices[j, 2] - p[2]
-    cx, cy, cz = vertices[k, 0] - p[0], vertices[k, 1] - p[1], vertices[k, 2] - p[2]
-    ah = ax * n[0] + ay * n[1] + az * n[2]
-    bh = bx * n[0] + by * n[1] + bz * n[2]
-    ch = cx * n[0] + cy * n[1] + cz * n[2]
+    a, b = difference(vertices[face[0]], p), difference(vertices[face[1]], p)
+    c = difference(vertices[face[2]], p)
+    ah, bh, ch = dot(a, n), dot(b, n), dot(c, n)
     if max(ah, bh, ch) <= 0.0:
         return 0.0
     # Straight above p: the normal through p on one side of all three edges.
-    u = n[0] * (ay * bz - az * by) + n[1] * (az * bx - ax * bz) + n[2] * (ax * by - ay * bx)
-    v = n[0] * (by * cz - bz * cy) + n[1] * (bz * cx - bx * cz) + n[2] * (bx * cy - by * cx)
-    w = n[0] * (cy * az - cz * ay) + n[1] * (cz * ax - cx * az) + n[2] * (cx * ay - cy * ax)
+    u, v, w = dot(n, cross(a, b)), dot(n, cross(b, c)), dot(n, cross(c, a))
     area = u + v + w
     inside = area != 0.0 and (min(u, v, w) >= 0.0 or max(u, v, w) <= 0.0)
     if inside and (v * ah + w * bh + u * ch) / area > TOUCHING_M:
         return 1.0
-    return max(
-        _edge_sine(ax, ay, az, ah, bx, by, bz, bh),
-        _edge_sine(bx, by, bz, bh, cx, cy, cz, ch),
-        _edge_sine(cx, cy, cz, ch, ax, ay, az, ah),
-    )
+    return max(_edge_sine(a, ah, b, bh), _edge_sine(b, bh, c, ch), _edge_sine(c, ch, a, ah))
 
 
 @njit(cache=True, nogil=True)
 @named_for_its_code
 def _bound(p, n, node):
     """No part of a node is seen from p under a higher sine of elevation, if that is below 1."""
-    x, y, z = node[0] - p[0], node[1] - p[1], node[2] - p[2]
-    height = n[0] * x + n[1] * y + n[2] * z + support(node, n[0], n[1], n[2])
+    height = dot(n, difference(node, p)) + support(node, n)
     if height <= 0.0:
         return 0.0
     nearest = box_distance(p, node)
@@ -101,8 +90,7 @@ def _fill(points, normals, vertices, faces, nodes, start, stop, found):
     waiting, keys = np.empty(DEPTH, dtype=np.int64), np.empty(DEPTH)
     highest_face = 0
     for i in range(start, stop):
-        p = (points[i, 0], points[i, 1], points[i, 2])
-        n = (normals[i, 0], normals[i, 1], normals[i, 2])
+        p, n = points[i], normals[i]
         # Neighbours mostly share the face that is highest.
         highest = max(LEAST_SINE - SLACK_SINE, _face_sine(p, n, vertices, faces[highest_face]))
         waiting[0], keys[0], left = 0, -np.inf, 1

@@ -1,13 +1,11 @@
 """A planned motion as a robot can drive it, and where the part may stand for all of it."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
-from scipy.ndimage import minimum_filter
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import PlanError
@@ -35,23 +33,15 @@ STEP_S = 0.02
 
 @dataclass(frozen=True)
 class Drive:
-    """A motion with the joints that drive it.
-
-    Attributes:
-        trajectory: the poses in the part's frame, timed as the joints allow, and rolled.
-        seconds: (M,) times of the joints from the first pose [s].
-        joints, speeds: (M, J) [rad or m, and per second].
-        limits: of passes that are slower than planned.
-        least_singular_value: of the tip's velocity by those of the joints, m and rad alike.
-    """
+    """A motion with the joints that drive it."""
 
     arm: Arm
-    trajectory: Trajectory
-    seconds: np.ndarray
-    joints: np.ndarray
+    trajectory: Trajectory  # poses in the part's frame, timed as the joints allow, and rolled
+    seconds: np.ndarray  # (M,) times of the joints from the first pose [s]
+    joints: np.ndarray  # (M, J) [rad or m], and their speeds (M, J) per second
     speeds: np.ndarray
-    limits: tuple[PassLimit, ...]
-    least_singular_value: float
+    limits: tuple[PassLimit, ...]  # of passes that are slower than planned
+    least_singular_value: float  # of the tip's velocity by those of the joints, m and rad alike
 
     @property
     def to_limit(self) -> tuple[float, str]:
@@ -96,10 +86,8 @@ class RobotCell:
     acceleration: float | None = None
 
     def __post_init__(self) -> None:
-        unknown = [
-            n for n, v in zip(self.arm.joints, self.arm.fastest, strict=True) if v == math.inf
-        ]
-        if unknown:
+        unknown = np.array(self.arm.joints)[np.isinf(self.arm.fastest)]
+        if len(unknown):
             raise PlanError(
                 f'the URDF has no greatest speed of {" ".join(unknown)}; give each a limit, as '
                 '<limit lower="-3" upper="3" effort="0" velocity="2"/>'
@@ -122,7 +110,7 @@ class RobotCell:
         most = arm.fastest / 0.25
         if self.acceleration is not None:
             most = np.full(len(arm), self.acceleration)
-        pace = JointPace(arm.joints, times_s, CubicSpline(times_s, joints), arm.fastest, most)
+        pace = JointPace(arm, times_s, CubicSpline(times_s, joints), most)
         # The pass that is sprayed at each time, as a simulation counts; -1 for none.
         spray_pass = np.full(len(times_s), -1)
         path, _ = spray_path(trajectory)
@@ -211,117 +199,3 @@ class RobotCell:
 
 def _words(place_m: np.ndarray) -> str:
     return '(' + ', '.join(f'{value:.2f}' for value in place_m) + ')'
-
-
-@dataclass(frozen=True)
-class PartPlaces:
-    """What a robot can do with the part at each place of a grid, all poses alike but for x and y.
-
-    Attributes:
-        cell: the robot, with the part where it was said to stand.
-        x_m, y_m: (X,) and (Y,) places of the part in the robot's base.
-        reached: (Y, X) share of the motion that is followed.
-        speed: (Y, X) share of the planned speed at the slowest moment; 0 where not all is reached.
-        room: (Y, X) least distance of a joint from its limits, as a share of its range.
-    """
-
-    cell: RobotCell
-    x_m: np.ndarray
-    y_m: np.ndarray
-    reached: np.ndarray
-    speed: np.ndarray
-    room: np.ndarray
-
-    @property
-    def good(self) -> np.ndarray:
-        """(Y, X) bool, places from which the robot is as fast as it can be from any."""
-        return self.speed >= min(1.0, self.speed.max())
-
-    @property
-    def amid(self) -> np.ndarray:
-        """(Y, X) bool, those all of whose neighbours were tried and are good too."""
-        return minimum_filter(self.good, 3, mode='constant', cval=False)
-
-    @property
-    def best(self) -> tuple[int, int]:
-        """Row and column of the place to choose: amid good ones if it can, with most room."""
-        score = np.where(self.amid if self.amid.any() else self.good, self.room, -1.0)
-        return divmod(int(score.argmax()), len(self.x_m))
-
-    @property
-    def part_pose(self) -> tuple[float, ...]:
-        """Pose of the part at the best place: x y z [m] and qx qy qz qw."""
-        row, column = self.best
-        return _placed(self.cell.part, self.x_m[column], self.y_m[row]).values
-
-    @property
-    def sentence(self) -> str:
-        """The answer in a sentence."""
-        whole, count = int((self.reached == 1.0).sum()), self.reached.size
-        if not whole:
-            row, column = divmod(int(self.reached.argmax()), len(self.x_m))
-            return (
-                f'from none of {count} places the robot drives the whole motion; from '
-                f'({self.x_m[column]:.2f}, {self.y_m[row]:.2f}) m it follows '
-                f'{100 * self.reached.max():.0f} % of it'
-            )
-        row, column = self.best
-        return (
-            f'from {whole} of {count} places the robot drives the whole motion, from '
-            f'{int((self.speed == 1.0).sum())} of them as fast as planned; at '
-            f'({self.x_m[column]:.2f}, {self.y_m[row]:.2f}) m it keeps '
-            f"{100 * self.room[row, column]:.0f} % of a joint's range from the limits"
-            + (
-                ''
-                if self.amid[row, column]
-                else '; not all places beside it were tried and are as good'
-            )
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """The figures by name."""
-        arrays = ('x_m', 'y_m', 'reached', 'speed', 'room')
-        return {
-            'sentence': self.sentence,
-            'part_pose': self.part_pose if self.speed.max() > 0.0 else None,
-            **{name: getattr(self, name).tolist() for name in arrays},
-        }
-
-
-def part_places(
-    trajectory: Trajectory,
-    cell: RobotCell,
-    x_m: np.ndarray,
-    y_m: np.ndarray,
-    free_roll: bool = False,
-    progress: Callable[[str, float], None] = lambda what, share: None,
-) -> PartPlaces:
-    """Try a motion, in the part's frame, with the part at each place of a grid.
-
-    ``cell.part`` gives the height and the turn of the part. Accelerations are not looked at.
-
-    Raises:
-        PlanError: the grid is empty.
-    """
-    if not len(x_m) or not len(y_m):
-        raise PlanError('the grid of places is empty; give FROM TO with FROM below TO')
-    arm, shape = cell.arm, (len(y_m), len(x_m))
-    reached, speed, room = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    # So many poses are enough for a motion that is only tried.
-    times_s = np.linspace(0.0, trajectory.duration_s, 150)
-    for number, (row, column) in enumerate(np.ndindex(shape)):
-        progress('places', number / reached.size)
-        at = row, column
-        tried = replace(cell, part=_placed(cell.part, x_m[column], y_m[row]))
-        positions_m, turns = tried.poses(trajectory, times_s)
-        _, ways, followed = ways_of(arm, positions_m, turns, free_roll)
-        reached[at] = followed.max(initial=0) / len(times_s)
-        if reached[at] == 1.0:
-            joints = ways[fastest_way(arm, ways, followed, times_s)]
-            speeds = np.abs(np.diff(joints, axis=0)) / times_s[1] / arm.fastest
-            speed[at], room[at] = min(1.0, 1.0 / speeds.max()), arm.room(joints).min()
-    return PartPlaces(cell, x_m, y_m, reached, speed, room)
-
-
-def _placed(part: Rigid, x_m: float, y_m: float) -> Rigid:
-    return replace(part, translation_m=np.array([x_m, y_m, part.translation_m[2]]))

@@ -21,16 +21,15 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.planning.passes import (
     PlannedPass,
-    plan_pass,
+    plan_passes,
     planned_moves,
     trajectory_of,
 )
-from paint_deposition.planning.plan import Plan, plan
+from paint_deposition.planning.plan import plan
 from paint_deposition.planning.planned_film import (
     PlannedFilm,
     WantedFilm,
@@ -41,6 +40,7 @@ from paint_deposition.planning.planned_film import (
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 from paint_deposition.planning.retiming import retime_for_evenness
+from paint_deposition.planning.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 
 # Of one face, in running order.
 Passes = tuple[PlannedPass, ...]
@@ -185,9 +185,7 @@ def _blended(
         for face in plans:
             for one in face.passes:
                 path, _ = spray_path(trajectory_of((one,)), max_step_m=model.max_step_m)
-                integrator.reset()
-                integrator.add(path)
-                films.append(integrator.raw_um / wanted.share)
+                films.append(integrator.raw_of(path) / wanted.share)
         films_um = np.array(films)
         # The time on each pass, over what it is on its face alone, for an even film of all. It
         # stays within half and twice that, and near it.
@@ -201,21 +199,13 @@ def _blended(
             overspray_m = plans[0].style.overspray_m
             _, unblended = evenness(films_um.sum(axis=0), area_m2)
     _, margin_m, plans, dwell = min(tried, key=lambda one: one[0])
-    return margin_m, _with_dwell(plans, dwell, request), unblended
-
-
-def _with_dwell(plans: Sequence[Plan], dwell: np.ndarray, request: PlanRequest) -> list[Passes]:
-    """The passes at their new speeds, with a lead-in to match."""
+    # The passes at their new speeds, with a lead-in to match.
     found, shares = [], iter(dwell.tolist())
     for face in plans:
-        passes = []
-        for number, planned in enumerate(face.passes):
-            speed = planned.speed_m_per_s / next(shares)
-            backwards = bool(number % 2) and not request.one_way
-            surface_map = face.line_films.surface_map
-            passes.append(plan_pass(surface_map, planned.across_m, face.style, backwards, speed))
-        found.append(tuple(passes))
-    return found
+        lines_m = [planned.across_m for planned in face.passes]
+        speeds = [planned.speed_m_per_s / next(shares) for planned in face.passes]
+        found.append(plan_passes(face.line_films.surface_map, lines_m, face.style, speeds))
+    return margin_m, found, unblended
 
 
 # --- order, and the way from face to face

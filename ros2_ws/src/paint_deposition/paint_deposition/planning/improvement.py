@@ -15,10 +15,10 @@ from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.driving import Drive
-from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT
+from paint_deposition.planning.nodes import BEND, FASTEST, JOINT, LEAD
 from paint_deposition.planning.planned_film import Contact, WantedFilm, evenness
 from paint_deposition.planning.programme import STANDING_M, Programme, speed_along, strokes_of
-from paint_deposition.planning.quadratic_program import LIMIT_NAMES
+from paint_deposition.planning.quadratic_program import SLOWEST
 from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.retiming import Retiming
 
@@ -223,11 +223,7 @@ class Improvement:
         # A mean film further from the target than this share gives a warning.
         if abs(off) > 0.02:
             thick = off > 0.0
-            other = (
-                (LIMIT_NAMES['slowest'],)
-                if thick
-                else tuple(LIMIT_NAMES[name] for name in (ROBOT, BEND, LEAD, JOINT))
-            )
+            other = (SLOWEST,) if thick else (FASTEST, BEND, LEAD, JOINT)
             names = [name for name in self.retiming.binding if name not in other]
             remedy = (
                 'a greater speed (speed_max_m_per_s) or a lower flow (flow)'

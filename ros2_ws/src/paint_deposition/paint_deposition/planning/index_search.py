@@ -2,8 +2,8 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
@@ -30,16 +30,15 @@ def parallel_passes(
     passes are as good as one-way ones. Turned by half a turn for every way back it lays the
     mirrored profile, and an asymmetric pattern makes an uneven pair.
     """
-    options: dict[str, Any] = {
-        'standoff_m': request.standoff_m, 'travel_rad': request.travel_rad, 'fineness': fineness,
-    }  # fmt: skip
-    first = sampled_collapse(model, speed_m_per_s, **options)
+    collapse = partial(
+        sampled_collapse, model, speed_m_per_s, fineness,
+        standoff_m=request.standoff_m, travel_rad=request.travel_rad,
+    )  # fmt: skip
+    first = collapse()
     # An effect may depend on the way: forth or back, up or down.
     if request.one_way or not (request.gun_turns or model.effects):
         return ParallelPasses.one_way(first)
-    second = sampled_collapse(
-        model, speed_m_per_s, backwards=True, turned=request.gun_turns, **options
-    )
+    second = collapse(backwards=True, turned=request.gun_turns)
     # Passes that differ by no more than rounding are the same.
     if np.abs(second.film_um - first.film_um).max() <= 1e-9 * first.film_um.max():
         return ParallelPasses.one_way(first)
@@ -59,9 +58,8 @@ def passes_to_cover(parallel: ParallelPasses, index_m: float, width_m: float) ->
     for count in range(max(1, math.floor(width_m / index_m)), most):
         film = np.zeros(len(across))
         for number, line_m in enumerate((np.arange(count) - 0.5 * (count - 1)) * index_m):
-            film += (parallel.second if number % 2 else parallel.first).thickness_um(
-                across - line_m
-            )
+            collapse = parallel.second if number % 2 else parallel.first
+            film += collapse.thickness_um(across - line_m)
         if film.min() >= enough:
             return count
     return most
@@ -110,7 +108,7 @@ class IndexCurve:
 
     def windows_m(self, tolerance: float) -> list[tuple[float, float]]:
         """Intervals of the index in the range within which sigma_n keeps to the tolerance."""
-        knots = [(float(i), float(s)) for i, s in zip(self.index_m, self.sigma_n, strict=True)]
+        knots = [*zip(self.index_m.tolist(), self.sigma_n.tolist(), strict=True)]
         knots = sorted(knots + [(m.index_m, m.sigma_n) for m in self.minima])
 
         def above(index_m: float) -> float:

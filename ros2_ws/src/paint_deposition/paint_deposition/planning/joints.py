@@ -162,12 +162,10 @@ class PassLimit:
 class JointPace:
     """What the joints along a motion allow; they are a function of the planned time."""
 
-    names: tuple[str, ...]
-
-    times_s: np.ndarray
+    arm: Arm
+    times_s: np.ndarray  # (N,) planned times
     joints: CubicSpline
-    fastest: np.ndarray
-    most: np.ndarray
+    most: np.ndarray  # (J,) greatest accelerations
 
     def shares(self, spray_pass: np.ndarray) -> np.ndarray:
         """(N,) share of the planned speed at the times, the greatest that the joints allow.
@@ -185,7 +183,7 @@ class JointPace:
         column = np.where(outside, spray_pass.max() + 1 + np.cumsum(outside), spray_pass)
         # The neighbours count too: the share changes evenly between the times.
         speed = maximum_filter1d(np.abs(self.joints(self.times_s, 1)), 3, axis=0) / (1.0 - MARGIN)
-        highest = np.minimum(1.0, (self.fastest / np.maximum(speed, 1e-12)).min(axis=1) ** 2)
+        highest = np.minimum(1.0, (self.arm.fastest / np.maximum(speed, 1e-12)).min(axis=1) ** 2)
         bound = np.ones(column.max() + 1)
         np.minimum.at(bound, column, highest)
         slopes, bends = self.joints(self.times_s, 1).T, self.joints(self.times_s, 2).T
@@ -233,13 +231,13 @@ class JointPace:
         share = (shares[step] + rise * since)[:, np.newaxis]
         joints, slope = self.joints(planned_s), self.joints(planned_s, 1)
         rate = self.joints(planned_s, 2) * share**2 + slope * rise[:, np.newaxis]
-        too_fast = (np.abs(slope * share) / self.fastest).max()
+        too_fast = (np.abs(slope * share) / self.arm.fastest).max()
         slower = max(1.0, float(too_fast), math.sqrt((np.abs(rate) / self.most).max()))
         return slower * reached_s, slower * seconds, joints, slope * share / slower
 
     def limits(self, spray_pass: np.ndarray, shares: np.ndarray) -> tuple[PassLimit, ...]:
         """For each pass that is slower than planned, the joint that makes it so."""
-        slope = np.abs(self.joints(self.times_s, 1)) / self.fastest
+        slope = np.abs(self.joints(self.times_s, 1)) / self.arm.fastest
         bend = np.sqrt(np.abs(self.joints(self.times_s, 2)) / self.most)
         found = []
         for number in np.unique(spray_pass[spray_pass >= 0]).tolist():
@@ -251,5 +249,5 @@ class JointPace:
             speed, rate = slope[inside].max(axis=0), bend[inside].max(axis=0)
             of_speed = speed.max() > rate.max()
             joint = int(np.argmax(speed if of_speed else rate))
-            found.append(PassLimit(number + 1, share, self.names[joint], bool(of_speed)))
+            found.append(PassLimit(number + 1, share, self.arm.joints[joint], bool(of_speed)))
         return tuple(found)

@@ -7,16 +7,17 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_matrix
 
-from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator, after_film_effects
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.programme import STANDING_M, Opening, Programme
 from paint_deposition.planning.requests import Limits
 
-ROBOT, BEND, LEAD, JOINT = 'speed', 'bend', 'lead', 'joint'
+# What limits the speed, as messages call it.
+FASTEST, BEND = 'the greatest speed', 'the speed in bends'
+LEAD, JOINT = 'the way to and from the opening of the gun', 'the speed of a joint of the robot'
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,11 @@ class Nodes:
 
     def __len__(self) -> int:
         return len(self.travel_m)
+
+    @property
+    def given_flow(self) -> np.ndarray:
+        """(m,) flow of the openings."""
+        return np.array([opening.flow for opening in self.openings])
 
     @property
     def followed(self) -> np.ndarray:
@@ -124,13 +130,13 @@ def speed_bounds(
     curvature = np.linalg.norm(bend, axis=1) / half**2
     allowed = np.sqrt(limits.acceleration_m_per_s2 / np.maximum(curvature, 1e-9))
     greatest = np.full(len(nodes), limits.speed_max_m_per_s)
-    limit = np.full(len(nodes), ROBOT, dtype=object)
-    bent = np.maximum(allowed, programmed) < greatest
-    greatest[bent], limit[bent] = np.maximum(allowed, programmed)[bent], BEND
+    limit = np.full(len(nodes), FASTEST, dtype=object)
+    others = [(BEND, np.maximum(allowed, programmed))]
     if programme.allowed:
-        by_joints = np.interp(places, *programme.allowed)
-        slower = by_joints < greatest
-        greatest[slower], limit[slower] = by_joints[slower], JOINT
+        others.append((JOINT, np.interp(places, *programme.allowed)))
+    for name, speed in others:
+        slower = speed < greatest
+        greatest[slower], limit[slower] = speed[slower], name
     for number, ends in enumerate(zip(programme.ends_m, programme.around_m, strict=True)):
         rows = nodes.rows(number)
         for end, far, node in zip(*ends, (rows.start, rows.stop - 1), strict=True):
@@ -166,14 +172,11 @@ class FilmAtPoints:
         self._integrator = FilmIntegrator(points, model, occluder=surface.occluder)
         narrow = min(min(p.sigma1_m, p.sigma2_m) for p in model.patterns)
         self.step_m = max(model.max_step_m, narrow / 6.0)
-        self._settles = [e for e in model.effects if type(e).on_film is not Effect.on_film]
 
     def film_um(self, programme: Programme) -> np.ndarray:
         """(V,) film of a programme at the points [um]."""
         path, _ = spray_path(programme.trajectory(), max_step_m=self.step_m)
-        self._integrator.reset()
-        self._integrator.add(path)
-        return self._integrator.raw_um * self._finished_over_arrived(path) / self._share
+        return self._integrator.raw_of(path) * self._finished_over_arrived(path) / self._share
 
     def of_nodes(self, programme: Programme, nodes: Nodes, density: np.ndarray) -> np.ndarray:
         """(n, V) films for a density of paint of 1 s/m at each node [um].
@@ -200,11 +203,9 @@ class FilmAtPoints:
 
     def _finished_over_arrived(self, path: SprayPath) -> np.ndarray | float:
         """(V,) finished film over the film that arrived, from effects on the finished film."""
-        if not self._settles:
+        if not any(effect.acts('on_film') for effect in self.model.effects):
             return 1.0
-        everywhere = self._surface.points()
-        whole = FilmIntegrator(everywhere, self.model, occluder=self._surface.occluder)
-        whole.add(path)
-        raw = whole.raw_um
-        settled = after_film_effects(raw, self._settles, everywhere)
-        return np.divide(settled, raw, out=np.ones(len(raw)), where=raw > 0.0)[self._rows]
+        surface = self._surface
+        whole = FilmIntegrator(surface.points(), self.model, occluder=surface.occluder)
+        raw = whole.raw_of(path)
+        return np.divide(whole.film_um, raw, out=np.ones(len(raw)), where=raw > 0.0)[self._rows]

@@ -86,7 +86,7 @@ def plan_pass(
     if backwards:
         line, positions, rotations = line[::-1], positions[::-1], rotations[::-1]
     step = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(step)])
+    along = np.append(0.0, np.cumsum(step))
     ends = np.array([first - style.overspray_m, last + style.overspray_m])
     order = 1.0 if not backwards else -1.0
     on, off = np.sort(np.interp(order * ends, order * line, along))
@@ -97,14 +97,16 @@ def plan_pass(
 
 
 def plan_passes(
-    surface_map: SurfaceMap, lines_m: np.ndarray, style: PassStyle
+    surface_map: SurfaceMap,
+    lines_m: Sequence[float] | np.ndarray,
+    style: PassStyle,
+    speeds_m_per_s: Sequence[float] | None = None,
 ) -> tuple[PlannedPass, ...]:
     """Passes along lines in this order; every other one runs backwards, unless all run one way."""
+    speeds = speeds_m_per_s or [style.speed_m_per_s] * len(lines_m)
     return tuple(
-        plan_pass(
-            surface_map, float(across), style, backwards=bool(number % 2) and not style.one_way
-        )
-        for number, across in enumerate(lines_m)
+        plan_pass(surface_map, float(across), style, bool(number % 2) and not style.one_way, speed)
+        for number, (across, speed) in enumerate(zip(lines_m, speeds, strict=True))
     )
 
 

@@ -52,17 +52,13 @@ class LineFilms:
         integrator = FilmIntegrator(points, model)
         # Sub-steps of single passes may be coarser than for a film: 1e-4 of the peak.
         longest = finest_m / 5.0
-        # Poses about a sub-step apart.
-        # Slower poses would be gaps, at which the gun is off.
+        # Poses about a sub-step apart; slower ones would be gaps, at which the gun is off.
         rate = max(style.speed_m_per_s / longest, 10.0)
         self.films_um = np.empty((count, len(rows)))
         for k, across in enumerate(self.lines_m):
             line = (plan_pass(surface_map, float(across), style),)
-            motion = trajectory_of(line, rate_hz=rate)
-            path, _ = spray_path(motion, max_step_m=longest)
-            integrator.reset()
-            integrator.add(path)
-            self.films_um[k] = integrator.raw_um
+            path, _ = spray_path(trajectory_of(line, rate_hz=rate), max_step_m=longest)
+            self.films_um[k] = integrator.raw_of(path)
             progress((k + 1) / count)
         # Cubic splines through the lines' films are linear in them: one matrix for all points.
         self._basis = CubicSpline(self.lines_m, np.eye(count))
@@ -83,10 +79,10 @@ class Placement:
     middle_m: float  # coordinate across of their middle
     sigma_n: float  # of their film on the part
 
-    @property
-    def lines_m(self) -> np.ndarray:
-        """(n,) coordinates across, increasing [m]."""
-        return lines_of(self.passes, self.index_m, self.middle_m)
+    def lines_m(self, direction: str) -> np.ndarray:
+        """(n,) coordinates across [m]: level lines from the top down, others from the left."""
+        lines = lines_of(self.passes, self.index_m, self.middle_m)
+        return lines if direction == 'horizontal' else lines[::-1]
 
 
 def lines_of(passes: int, index_m: float | np.ndarray, middle_m: float | np.ndarray) -> np.ndarray:
@@ -149,8 +145,7 @@ def best_placement(
     widest = (films.high_m - films.low_m) / max(passes - 1, 1)
     high = min(high, widest)
     index = np.linspace(low, high, 25 if high > low and passes > 1 else 1)
-    offset = np.linspace(-0.5, 0.5, 25)
-    indices, offsets = (grid.ravel() for grid in np.meshgrid(index, offset))
+    indices, offsets = (grid.ravel() for grid in np.meshgrid(index, np.linspace(-0.5, 0.5, 25)))
     lines = lines_of(passes, indices, middle + offsets * indices)
     inside = (lines.min(axis=1) >= films.low_m) & (lines.max(axis=1) <= films.high_m)
     if not inside.any():

@@ -155,12 +155,10 @@ def plan(
     placement = place_passes(films, ends, index_range, request.tolerance)
     count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
     on_part = placement_at(films, count, plane.index_m, 0.5 * (ends[0] + ends[1]))
-    # Level passes go from the top down, vertical ones from the left to the right.
-    lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
     target = None if request.speed_m_per_s else wanted.target_um
     rounds = 4
     for round_ in range(rounds):
-        passes = plan_passes(surface_map, lines, style)
+        passes = plan_passes(surface_map, placement.lines_m(request.direction), style)
         found = predicted(
             surface, model, request, wanted,
             trajectory_of(passes, frame_id), lambda share: progress('film', share),
@@ -179,8 +177,7 @@ def plan(
 def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) -> PassStyle:
     overspray = request.overspray_m
     if overspray is None:
-        distance = plane.standoff_m + model.projection.emission_offset_m
-        widening = distance / model.projection.model_plane_m
+        widening = model.projection.widening(plane.standoff_m)
         radii = np.linspace(0.0, model.planar.radius_of_flux_m(1e-6), 500)
         enclosed = model.planar.enclosed_fraction(radii)
         # The gun opens where 90 % of the pattern's volume begin to reach the part.
@@ -207,9 +204,8 @@ def optimise(
     """
     request, count = unoptimised.request, len(unoptimised.passes)
     target = unoptimised.wanted.target_um or unoptimised.mean_um
-    wanted_cm3 = target * float(
-        unoptimised.surface.vertex_areas_m2[unoptimised.wanted.region].sum()
-    )
+    areas_m2 = unoptimised.surface.vertex_areas_m2
+    wanted_cm3 = target * float(areas_m2[unoptimised.wanted.region].sum())
     low, high = unoptimised.line_films.surface_map.extent_m[1].tolist()
     least, most = (share * unoptimised.plane.index_m for share in INDEX_SHARES)
     placements = [unoptimised.placement]
@@ -248,10 +244,9 @@ def _timed_plan(
     request, surface = unoptimised.request, unoptimised.surface
     even = unoptimised.style.speed_m_per_s * placement.passes / len(unoptimised.passes)
     speed = float(np.clip(even, request.speed_min_m_per_s, request.speed_max_m_per_s))
-    # The run-up is that of the fastest.
     # The lead-in is long enough for a speed at the ends of a pass of this many times the mean.
     style = replace(unoptimised.style, speed_m_per_s=1.3 * speed)
-    lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
+    lines = placement.lines_m(request.direction)
     passes = tuple(
         replace(planned, speed_m_per_s=speed)
         for planned in plan_passes(unoptimised.line_films.surface_map, lines, style)

@@ -39,22 +39,14 @@ Band = tuple[np.ndarray, float, float | None]
 
 @dataclass(frozen=True)
 class WantedFilm:
-    """The film wanted on a region of a part; a film over ``share`` should be the mean target.
+    """The film wanted on a region of a part; a film over ``share`` should be the mean target."""
 
-    Attributes:
-        region: (V,) bool, vertices whose film counts.
-        target_um: mean target there; None: it is that of the film as it is.
-        elsewhere_um: target outside of the zones, None: none.
-        share: (V,) target of each vertex over the mean target.
-        zones: of the vertices, or None. free_m2: what is painted and has no target [m^2].
-    """
-
-    region: np.ndarray
-    target_um: float | None
-    elsewhere_um: float | None
-    share: np.ndarray
-    zones: PointZones | None = None
-    free_m2: float = 0.0
+    region: np.ndarray  # (V,) bool, vertices whose film counts
+    target_um: float | None  # mean target there; None: it is that of the film as it is
+    elsewhere_um: float | None  # target outside of the zones, None: none
+    share: np.ndarray  # (V,) target of each vertex over the mean target
+    zones: PointZones | None = None  # of the vertices
+    free_m2: float = 0.0  # what is painted and has no target [m^2]
 
     @staticmethod
     def of(
@@ -120,9 +112,9 @@ class WantedFilm:
     def accepted(self, film_um: np.ndarray, target_um: float, tolerance: float) -> np.ndarray:
         """(V,) bool, where a film (V,) [um] is within its band; the rest as for ``bands``."""
         good = np.zeros(len(film_um), dtype=bool)
-        for points, target, off in self.bands(np.arange(len(good)), target_um, tolerance):
-            least, most = target * (1.0 - (off or 0.0)), target * (1.0 + (off or 0.0))
-            good |= points & (film_um >= least) & (film_um <= most)
+        for points, target, share in self.bands(np.arange(len(good)), target_um, tolerance):
+            off = share or 0.0
+            good |= points & (film_um >= target * (1.0 - off)) & (film_um <= target * (1.0 + off))
         return good
 
 
@@ -153,15 +145,14 @@ def predicted(
     """
     film, paint = simulated(surface, model, trajectory, progress)
     region, target = wanted.region, request.target_um or 0.0
+    statistics, whole_part = (
+        film_statistics(
+            film[rows], surface.vertex_areas_m2[rows], paint.emitted_cm3, target_um=target,
+            target_tolerance_um=0.1 * target, zones=wanted.zones and wanted.zones.select(rows),
+        )
+        for rows in (region, np.ones_like(region))
+    )  # fmt: skip
     area = surface.vertex_areas_m2[region]
-    statistics = film_statistics(
-        film[region], area, paint.emitted_cm3, target_um=target, target_tolerance_um=0.1 * target,
-        zones=wanted.zones and wanted.zones.select(region),
-    )  # fmt: skip
-    whole_part = film_statistics(
-        film, surface.vertex_areas_m2, paint.emitted_cm3, target_um=target,
-        target_tolerance_um=0.1 * target, zones=wanted.zones,
-    )  # fmt: skip
     return {
         'surface': surface, 'model': model, 'request': request, 'wanted': wanted,
         'trajectory': trajectory, 'film_um': film, 'paint': paint, 'statistics': statistics,

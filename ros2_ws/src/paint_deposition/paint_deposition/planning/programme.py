@@ -58,21 +58,16 @@ class Programme:
         Raises:
             PlanError: the gun never sprays on a move, or its clock goes back in between.
         """
-        screen = PoseScreen(gap_ns(max_pose_gap_s))
-        batch = PoseBatch(
-            np.asarray(trajectory.stamps_ns, np.int64),
-            np.asarray(trajectory.positions_m, float),
-            np.asarray(trajectory.quaternions_xyzw, float),
+        batch = PoseBatch.of(
+            trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw
         )
-        streams = screen.take(batch)
-        if len(streams) > 1:
+        poses, *restarted = PoseScreen(gap_ns(max_pose_gap_s)).take(batch)
+        if restarted:
             raise PlanError(
-                f'{trajectory.source}: its clock goes back {len(streams) - 1} times; give one run'
+                f'{trajectory.source}: its clock goes back {len(restarted)} times; give one run'
             )
-        poses = streams[0]
-        travel = np.concatenate(
-            [[0.0], np.cumsum(np.linalg.norm(np.diff(poses.positions_m, axis=0), axis=1))]
-        )
+        steps_m = np.linalg.norm(np.diff(poses.positions_m, axis=0), axis=1)
+        travel = np.append(0.0, np.cumsum(steps_m))
         seconds = (poses.stamps_ns - poses.stamps_ns[0]) * 1e-9
         programme = Programme(
             poses.positions_m, poses.quaternions_xyzw, travel, np.diff(seconds),
@@ -85,7 +80,7 @@ class Programme:
     @cached_property
     def clock_s(self) -> np.ndarray:
         """(N,) time at each pose from the first [s]."""
-        return np.concatenate([[0.0], np.cumsum(self.duration_s)])
+        return np.append(0.0, np.cumsum(self.duration_s))
 
     @cached_property
     def _rising_m(self) -> np.ndarray:
@@ -132,18 +127,15 @@ class Programme:
         wanted = np.unique(travel_m[(travel_m > 0.0) & (travel_m < self.travel_m[-1])])
         wanted = wanted[np.diff(wanted, prepend=-1.0) > STANDING_M]
         row = np.searchsorted(self.travel_m, wanted, side='right') - 1
-        near = np.minimum(
-            np.abs(wanted - self.travel_m[row]), np.abs(wanted - self.travel_m[row + 1])
-        )
-        wanted, row = wanted[near > STANDING_M], row[near > STANDING_M]
-        if not len(wanted):
+        before, after = self.travel_m[row], self.travel_m[row + 1]
+        apart = np.minimum(np.abs(wanted - before), np.abs(wanted - after)) > STANDING_M
+        if not apart.any():
             return self
-        share = (wanted - self.travel_m[row]) / (self.travel_m[row + 1] - self.travel_m[row])
-        clock = self.clock_s
+        wanted, row = wanted[apart], row[apart]
+        share = (wanted - before[apart]) / (after - before)[apart]
+        clock, steps_m = self.clock_s, np.diff(self.positions_m, axis=0)
         seconds = clock[row] + share * self.duration_s[row]
-        between = self.positions_m[row] + share[:, np.newaxis] * (
-            self.positions_m[row + 1] - self.positions_m[row]
-        )
+        between = self.positions_m[row] + share[:, np.newaxis] * steps_m[row]
         turns = self.turns_at_s(seconds).as_quat()
         order = np.argsort(np.concatenate([clock, seconds]), kind='stable')
         return replace(
@@ -262,7 +254,7 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
         places = np.linspace(on_m, off_m, 401)
         speed = speed_along(programme, places)
         least = np.maximum(request.move_min_m, speed / request.settings_per_s)
-        count = np.concatenate([[0.0], np.cumsum(np.diff(places) / least)])
+        count = np.append(0.0, np.cumsum(np.diff(places) / least))
         whole_moves = np.linspace(0.0, count[-1], max(2, int(count[-1]) + 1))
         stops.append(np.interp(whole_moves, count, places))
     stops_m = np.concatenate(stops)

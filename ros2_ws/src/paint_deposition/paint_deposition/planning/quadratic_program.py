@@ -14,21 +14,14 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, identity, vstack
 
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT, Nodes
+from paint_deposition.planning.nodes import BEND, FASTEST, JOINT, LEAD, Nodes
 from paint_deposition.planning.planned_film import Band
 from paint_deposition.planning.requests import ImproveRequest
 
-LIMIT_NAMES = {
-    ROBOT: 'the greatest speed',
-    BEND: 'the speed in bends',
-    LEAD: 'the way to and from the opening of the gun',
-    JOINT: 'the speed of a joint of the robot',
-    'slowest': 'the least speed',
-    'acceleration': 'the acceleration',
-    'jerk': 'the jerk',
-    'flow': 'the range of the flow',
-}
-
+# As in ``nodes``.
+SLOWEST, ACCELERATION, JERK = 'the least speed', 'the acceleration', 'the jerk'
+FLOW = 'the range of the flow'
+LIMITS = frozenset((FASTEST, BEND, LEAD, JOINT, SLOWEST, ACCELERATION, JERK, FLOW))
 
 # Names (R,), matrix (R, size) and limits (R,) of constraints ``matrix @ x <= limit``.
 Constraints = tuple[np.ndarray, csr_matrix, np.ndarray]
@@ -75,7 +68,7 @@ class Problem:
             request=self.request.model_copy(update=weights),
             bands=(),
             open_ends=np.ones(len(self.nodes), dtype=bool),
-            left_out=frozenset(LIMIT_NAMES) - {'flow'},
+            left_out=LIMITS - {FLOW},
         )
 
 
@@ -96,20 +89,19 @@ def solve(problem: Problem, start: Density, rounds: int = 8) -> Density:
             for name in dict.fromkeys(names.tolist()):
                 others = names != name
                 without = names[others], rows[others], limit[others]
-                if name in LIMIT_NAMES and _minimise(matrix, linear, without) is not None:
-                    contradicting = f'{LIMIT_NAMES[name]} with the other limits'
+                if name in LIMITS and _minimise(matrix, linear, without) is not None:
+                    contradicting = f'{name} with the other limits'
                     break
             raise PlanError(f'no motion along this path keeps {contradicting}; allow more')
         values, multipliers = answer
         # A multiplier times a density is what its limit costs, in the units of the objective. A
         # constraint that costs more than this, in units of sigma_n squared, binds.
         costly = names[multipliers * float(values[:count].mean()) > 1e-6]
-        binding = [name for name in dict.fromkeys(costly.tolist()) if name in LIMIT_NAMES]
-        flow = values[count:]
+        flow, limits = values[count:], LIMITS
         if least >= most:
-            flow = np.array([opening.flow for opening in problem.nodes.openings])
-            binding = [name for name in binding if name != 'flow']
-        found = Density(np.maximum(values[:count], 0.0), flow, tuple(binding))
+            flow, limits = problem.nodes.given_flow, LIMITS - {FLOW}
+        binding = tuple(name for name in dict.fromkeys(costly.tolist()) if name in limits)
+        found = Density(np.maximum(values[:count], 0.0), flow, binding)
         change = np.abs(found.density - now.density).max() / np.abs(found.density).max()
         now = found
         if change < 3e-3:
@@ -166,18 +158,16 @@ def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float
     """Points beyond an edge of the film / target - 1, that edge, and what they count more."""
     request, found = problem.request, []
     for points, target, off in problem.bands:
-        sides = []
-        if off is not None:
-            sides += [(1.0, off, 3.0), (-1.0, -off, 3.0)]
+        sides = [(1.0, off, 3.0), (-1.0, -off, 3.0)] if off is not None else []
         # The film's bounds are kept where possible.
-        if request.film_min_um is not None:
-            sides.append((-1.0, request.film_min_um / target - 1.0, 100.0))
-        if request.film_max_um is not None:
-            sides.append((1.0, request.film_max_um / target - 1.0, 100.0))
-        found += [
-            (points & (side * (error - edge) > 0.0), edge, weight) for side, edge, weight in sides
-        ]
-    return [hinge for hinge in found if hinge[0].any()]
+        for side, bound_um in ((-1.0, request.film_min_um), (1.0, request.film_max_um)):
+            if bound_um is not None:
+                sides.append((side, bound_um / target - 1.0, 100.0))
+        for side, edge, weight in sides:
+            beyond = points & (side * (error - edge) > 0.0)
+            if beyond.any():
+                found.append((beyond, edge, weight))
+    return found
 
 
 def _constraints(problem: Problem, now: Density) -> Constraints:
@@ -189,10 +179,10 @@ def _constraints(problem: Problem, now: Density) -> Constraints:
     none = np.zeros(1)
     least = np.minimum(limits.speed_min_m_per_s, 0.999 * greatest)
     rows: list[tuple[str, csr_matrix, np.ndarray]] = [
-        ('slowest', y - diags(1.0 / least) @ f, none),
+        (SLOWEST, y - diags(1.0 / least) @ f, none),
         ('positive', -y[closable], none),
     ]
-    for name in (ROBOT, BEND, LEAD, JOINT):  # y >= f / v
+    for name in (FASTEST, BEND, LEAD, JOINT):  # y >= f / v
         some = np.flatnonzero((limited_by == name) & ~closable)
         rows.append((name, diags(1.0 / greatest[some]) @ f[some] - y[some], none))
     # Nodes from which the gun sprays on to the next one for certain.
@@ -204,7 +194,7 @@ def _constraints(problem: Problem, now: Density) -> Constraints:
         # y^3 / f^2 about (y0, f0) is 3 (y0/f0)^2 y - 2 (y0/f0)^3 f.
         ratio = now.slowness(nodes)[node]
         most = diags(3.0 * reach * ratio**2) @ y[node] - diags(2.0 * reach * ratio**3) @ f[pairs]
-        rows += [('acceleration', rise - most, none), ('acceleration', -rise - most, none)]
+        rows += [(ACCELERATION, rise - most, none), (ACCELERATION, -rise - most, none)]
     # y^4 / f^3, for the change of slowness by the jerk alone.
     inner = pairs[:-1][np.diff(pairs) == 1] + 1
     reach = (
@@ -213,10 +203,9 @@ def _constraints(problem: Problem, now: Density) -> Constraints:
     ratio = now.slowness(nodes)[inner]
     bend = y[inner + 1] - 2.0 * y[inner] + y[inner - 1]
     most = diags(4.0 * reach * ratio**3) @ y[inner] - diags(3.0 * reach * ratio**4) @ f[inner]
-    rows += [('jerk', bend - most, none), ('jerk', -bend - most, none)]
-    given = np.array([opening.flow for opening in nodes.openings])
-    rows.append(('flow', unit[count:], limits.flow[1] * given))
-    rows.append(('flow', -unit[count:], -limits.flow[0] * given))
+    rows += [(JERK, bend - most, none), (JERK, -bend - most, none)]
+    rows.append((FLOW, unit[count:], limits.flow[1] * nodes.given_flow))
+    rows.append((FLOW, -unit[count:], -limits.flow[0] * nodes.given_flow))
     names, matrices, ends = zip(
         *(row for row in rows if row[1].shape[0] and row[0] not in problem.left_out), strict=True
     )

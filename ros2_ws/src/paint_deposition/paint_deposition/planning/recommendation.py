@@ -130,7 +130,13 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         searched = _within_speeds(parallel, speed, request, *searched)
     curve = IndexCurve.of(parallel, *searched)
     best = choose_index(curve, request.tolerance)
-    _refuse_stripes(parallel, best, width)
+    period = np.linspace(0.0, parallel.period_m(best.index_m), 65)
+    # Film below this share of the mean, between passes, is a bare stripe.
+    if parallel.thickness_um(best.index_m, period).min() < 0.01 * parallel.mean_um(best.index_m):
+        raise PlanError(
+            f'an index of {best.index_m:.3f} m leaves bare stripes: one pass is '
+            f'{width:.3f} m wide at half its height; search about that index'
+        )
     if request.speed_m_per_s is None:
         curve, best, speed = _at_target(model, request, curve, best, speed)
     tolerance = request.tolerance
@@ -186,17 +192,6 @@ def _standoff_drift_m(
     distance = standoff_m + model.projection.emission_offset_m
     nearer, further = (distance * (index_m / end - 1.0) for end in window_m[::-1])
     return max(nearer, -standoff_m), further
-
-
-def _refuse_stripes(parallel: ParallelPasses, best: Minimum, half_width_m: float) -> None:
-    period = parallel.period_m(best.index_m)
-    least = parallel.thickness_um(best.index_m, np.linspace(0.0, period, 65)).min()
-    # Film below this share of the mean, between passes, is a bare stripe.
-    if least < 0.01 * parallel.mean_um(best.index_m):
-        raise PlanError(
-            f'an index of {best.index_m:.3f} m leaves bare stripes: one pass is '
-            f'{half_width_m:.3f} m wide at half its height; search about that index'
-        )
 
 
 def _within_speeds(

@@ -9,18 +9,9 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.nodes import FilmAtPoints, Nodes, retime, speed_bounds
-from paint_deposition.planning.planned_film import (
-    Band,
-    WantedFilm,
-    stratified_sample,
-)
+from paint_deposition.planning.planned_film import WantedFilm, stratified_sample
 from paint_deposition.planning.programme import Opening, Programme
-from paint_deposition.planning.quadratic_program import (
-    LIMIT_NAMES,
-    Density,
-    Problem,
-    solve,
-)
+from paint_deposition.planning.quadratic_program import Density, Problem, solve
 from paint_deposition.planning.requests import ImproveRequest
 
 # Rounds of the solver where an approximate solution is enough: triggers, and the cost of limits.
@@ -45,7 +36,7 @@ class Retiming:
 def retime_for_evenness(
     surface: Surface,
     wanted: WantedFilm,
-    programme: Programme,
+    original: Programme,
     models: Sequence[DepositionModel],
     request: ImproveRequest,
     progress: Callable[[str, float], None] = lambda what, share: None,
@@ -66,102 +57,81 @@ def retime_for_evenness(
     rows = np.flatnonzero(wanted.region)
     rows = rows[stratified_sample(surface.vertex_areas_m2[wanted.region])]
     films = [FilmAtPoints(surface, rows, model, wanted.share[rows]) for model in models]
-    mean = float(films[0].film_um(programme).mean())
-    target = wanted.target_um or request.target_um or mean
-    bands = wanted.bands(rows, target, request.tolerance)
+    mean_um = float(films[0].film_um(original).mean())
+    target_um = wanted.target_um or request.target_um or mean_um
+    bands = wanted.bands(rows, target_um, request.tolerance)
     narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
     # Nodes per width of the pattern, within bounds.
-    spacing = min(max(narrow / 2.0, 0.015), 0.05)
-    search = _Search(programme, films, target, target / mean, bands, request, spacing, progress)
-    return search.retiming(explain)
+    spacing_m = min(max(narrow / 2.0, 0.015), 0.05)
+    flow = np.array([opening.flow for opening in original.openings])
+    lengths_m = np.diff(original.ends_m)[:, 0]
+    seconds, level = np.diff(original.seconds_at(original.ends_m))[:, 0], target_um / mean_um
 
-
-@dataclass(frozen=True)
-class _Search:
-    """The search for one programme and request."""
-
-    original: Programme
-    films: Sequence[FilmAtPoints]
-    target_um: float
-    target_over_mean: float  # of the original programme's film
-    bands: Sequence[Band]
-    request: ImproveRequest
-    spacing_m: float
-    progress: Callable[[str, float], None]
-
-    def retiming(self, explain: bool) -> Retiming:
-        """Choose where the gun opens; then solve and simulate in turn until both films agree."""
-        self.progress('triggers', 0.0)
-        openings, relaxed = self.original.openings, None
-        nodes = Nodes.of(widened(self.original, self.request), self.spacing_m)
-        open_ends = _may_be_closed(nodes, openings, self.request)
-        if open_ends.any():
-            relaxed, density = self._problem(nodes, None, open_ends)
-            density = solve(relaxed, density, ROUGH_ROUNDS)
-            openings = _openings(relaxed, density.density, openings)
-        nodes = Nodes.of(openings, self.spacing_m)
-        closed = np.zeros(len(nodes), dtype=bool)
-        found: Density | None = None
-        rounds = 4
-        for round_ in range(rounds):
-            self.progress('speeds', round_ / rounds)
-            problem, start = self._problem(nodes, found, closed)
-            found = solve(problem, start)
-            timed = self._timed(nodes, found)
-            laid = [one.film_um(timed) for one in self.films]
-            expected = problem.films_um(found)
-            off = max(float(np.abs(a - b).max()) for a, b in zip(expected, laid, strict=True))
-            # The film of the solution and that of the timed programme agree.
-            if off <= 5e-4 * self.target_um:
-                break
-        assert found is not None
-        limits: dict[str, float] = {}
-        of_path = now = _sigma_n(laid)
-        if explain:
-            for number, name in enumerate(found.binding):
-                self.progress('limits', number / len(found.binding))
-                without = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
-                # A limit is reported if sigma_n would be lower by 2 % without it.
-                if without < 0.98 * now:
-                    limits[LIMIT_NAMES[name]] = without
-            limits = dict(sorted(limits.items(), key=lambda limit: limit[1]))
-            free = [_solved_sigma_n(problem.relaxed(), found)]
-            if relaxed is not None:
-                free.append(_solved_sigma_n(relaxed.relaxed(), density))
-            of_path = min(now, *free)
-        names = tuple(LIMIT_NAMES[name] for name in found.binding)
-        return Retiming(self.original, timed, self.target_um, names, limits, of_path)
-
-    def _problem(
-        self, nodes: Nodes, density: Density | None, open_ends: np.ndarray
-    ) -> tuple[Problem, Density]:
-        """The problem about a density; without one, about the original mean of each opening."""
-        original, request = self.original, self.request
-        bounds = speed_bounds(replace(original, openings=nodes.openings), nodes, request)
-        flow = np.array([opening.flow for opening in original.openings])
-        seconds = np.diff(original.seconds_at(original.ends_m))[:, 0]
-        if density is None:
-            slowness = np.clip(
-                self.target_over_mean * seconds / np.diff(original.ends_m)[:, 0],
-                1.0 / request.speed_max_m_per_s,
-                1.0 / request.speed_min_m_per_s,
-            )
-            density = Density((flow * slowness)[nodes.opening], flow)
-        timed = self._timed(nodes, density)
-        films = [one.of_nodes(timed, nodes, density.density) for one in self.films]
-        sprayed_s = self.target_over_mean * float(flow @ seconds)
-        return Problem(
-            films, self.target_um, self.bands, nodes, bounds, request, sprayed_s, open_ends
-        ), density
-
-    def _timed(self, nodes: Nodes, density: Density) -> Programme:
+    def timed_at(nodes: Nodes, density: Density) -> Programme:
         flows = zip(nodes.openings, density.flow.tolist(), strict=True)
         openings = tuple(replace(opening, flow=flow) for opening, flow in flows)
-        programme = replace(self.original, openings=openings)
-        return retime(programme, nodes, density.slowness(nodes), self.request)
+        programme = replace(original, openings=openings)
+        return retime(programme, nodes, density.slowness(nodes), request)
+
+    def problem_about(
+        nodes: Nodes, density: Density | None, open_ends: np.ndarray
+    ) -> tuple[Problem, Density]:
+        """The problem about a density; without one, about the original mean of each opening."""
+        bounds = speed_bounds(replace(original, openings=nodes.openings), nodes, request)
+        if density is None:
+            fastest, slowest = request.speed_max_m_per_s, request.speed_min_m_per_s
+            slowness = np.clip(level * seconds / lengths_m, 1.0 / fastest, 1.0 / slowest)
+            density = Density((flow * slowness)[nodes.opening], flow)
+        timed = timed_at(nodes, density)
+        of_nodes = [one.of_nodes(timed, nodes, density.density) for one in films]
+        sprayed_s = level * float(flow @ seconds)
+        return Problem(
+            of_nodes, target_um, bands, nodes, bounds, request, sprayed_s, open_ends
+        ), density
+
+    # Choose where the gun opens; then solve and simulate in turn until both films agree.
+    progress('triggers', 0.0)
+    openings, free = original.openings, []
+    nodes = Nodes.of(widened(original, request), spacing_m)
+    open_ends = _may_be_closed(nodes, openings, request)
+    if open_ends.any():
+        relaxed, density = problem_about(nodes, None, open_ends)
+        density = solve(relaxed, density, ROUGH_ROUNDS)
+        openings = _openings(relaxed, density.density, openings)
+        free = [(relaxed, density)]
+    nodes = Nodes.of(openings, spacing_m)
+    closed = np.zeros(len(nodes), dtype=bool)
+    found: Density | None = None
+    rounds = 4
+    for round_ in range(rounds):
+        progress('speeds', round_ / rounds)
+        problem, start = problem_about(nodes, found, closed)
+        found = solve(problem, start)
+        timed = timed_at(nodes, found)
+        laid = [one.film_um(timed) for one in films]
+        expected = problem.films_um(found)
+        off = max(float(np.abs(a - b).max()) for a, b in zip(expected, laid, strict=True))
+        # The film of the solution and that of the timed programme agree.
+        if off <= 5e-4 * target_um:
+            break
+    assert found is not None
+    limits: dict[str, float] = {}
+    of_path = now = _sigma_n(laid)
+    if explain:
+        for number, name in enumerate(found.binding):
+            progress('limits', number / len(found.binding))
+            without = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
+            # A limit is reported if sigma_n would be lower by 2 % without it.
+            if without < 0.98 * now:
+                limits[name] = without
+        limits = dict(sorted(limits.items(), key=lambda limit: limit[1]))
+        free = [(problem, found), *free]
+        of_path = min(now, *(_solved_sigma_n(one.relaxed(), start) for one, start in free))
+    return Retiming(original, timed, target_um, found.binding, limits, of_path)
 
 
 def _solved_sigma_n(problem: Problem, start: Density) -> float:
+    """Root mean square over the models of sigma_n, at the solution."""
     return _sigma_n(problem.films_um(solve(problem, start, ROUGH_ROUNDS)))
 
 

@@ -14,10 +14,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.special import fdtrc
 
-from paint_deposition import __version__
+from paint_deposition import __version__, git_version
 from paint_deposition.files.atomic import plain, write_text
-from paint_deposition.files.version import git_version
-from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import CPK_MEANS, film_statistics
 from paint_deposition.inference.comparison.comparison import SideBySide
@@ -26,6 +24,7 @@ from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.planning.improvement import FilmSummary, Improvement
 from paint_deposition.report import charts, words
+from paint_deposition.report.colour_scales import film_scale
 from paint_deposition.report.data import (
     ReportData,
     blind_rows,
@@ -256,7 +255,9 @@ def _verdict(data: ReportData) -> dict[str, Any]:
 def key_figures(data: ReportData) -> list[Row]:
     """The figures beside the verdict."""
     noise, diagnosis = data.study.noise, data.diagnosis
-    source = {'repeats': 'from repeats', 'stated': 'as stated'}.get(noise.source, noise.source)
+    source = {'stated': 'as stated', 'assumed': 'assumed'}.get(
+        noise.source, f'from {noise.source}'
+    )
     floor = ('Gauge and texture', '', f'{data.study.noise_floor_um:.2f}', f'µm, {source}')
     if diagnosis is None:
         labels = [f'Error, {name}' for name in data.names] or ['Error']

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure, FigureBase
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import replacing
-from paint_deposition.film.colour_scales import TABLE, ColourScale
+from paint_deposition.report.colour_scales import TABLE, ColourScale
 
 INK = '#1f2933'
 MUTED = '#616e7c'

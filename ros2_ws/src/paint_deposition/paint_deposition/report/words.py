@@ -216,8 +216,8 @@ def count_words(study: Study) -> str:
     )  # fmt: skip
     readings, points = len(study.campaign.readings), len(study)
     text = f'{readings} readings'
-    if scanned := study.campaign.scanned:
-        text = f'{scanned} readings in {points} cells'
+    if scan := study.campaign.scan:
+        text = f'{len(scan.readings)} readings in {points} cells'
     elif points != readings:
         text += f' at {points} points'
     return f'{text} on {names}'

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, PathContext, parameter, read_only
-from paint_deposition.motion.path import SprayPath
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
 
 # A gun that is slower than this stands, and its log trembles [m/s].
 STANDING_M_PER_S = 0.003

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, parameter, read_only
-from paint_deposition.part.points import SurfacePoints
+from paint_deposition.effects.base import Effect, SurfacePoints, parameter, read_only
 
 
 class EdgeBuild(Effect):

@@ -1,7 +1,6 @@
 """Flow that drifts from pass to pass."""
 
-from paint_deposition.effects.base import Effect, PathContext, parameter, read_only
-from paint_deposition.motion.path import SprayPath
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
 
 # The calibrated flow is that of the middle of a job; live nobody knows how many passes will come.
 MIDDLE_PASS = 2.5

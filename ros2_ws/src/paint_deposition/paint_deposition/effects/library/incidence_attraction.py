@@ -1,7 +1,6 @@
 """Attraction to surface that turns away from the gun, or rebound from it."""
 
-from paint_deposition.effects.base import Effect, parameter, read_only
-from paint_deposition.kernel.laws import Ray
+from paint_deposition.effects.base import Effect, Ray, parameter, read_only
 
 
 class IncidenceAttraction(Effect):

@@ -2,8 +2,7 @@
 
 import scipy
 
-from paint_deposition.effects.base import Effect, PathContext, parameter, read_only
-from paint_deposition.motion.path import SprayPath
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
 
 
 class PartMisalignment(Effect):

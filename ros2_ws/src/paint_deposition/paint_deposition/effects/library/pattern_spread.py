@@ -1,8 +1,7 @@
 """A pattern that does not widen in proportion to the distance."""
 
-from paint_deposition.effects.base import Effect, parameter, read_only
+from paint_deposition.effects.base import Effect, Ray, parameter, read_only
 from paint_deposition.kernel.fast_math import power
-from paint_deposition.kernel.laws import Ray
 
 # Standoffs between a quarter of the model plane's distance and four times it are within reach.
 STANDOFF_RANGE = 4.0

@@ -1,8 +1,7 @@
 """Transfer efficiency that falls with the distance from the bell."""
 
-from paint_deposition.effects.base import Effect, parameter, read_only
+from paint_deposition.effects.base import Effect, Ray, parameter, read_only
 from paint_deposition.kernel.fast_math import power
-from paint_deposition.kernel.laws import Ray
 
 
 class StandoffEfficiency(Effect):

@@ -1,7 +1,6 @@
 """A TCP calibrated to the side of the bell's centre."""
 
-from paint_deposition.effects.base import Effect, PathContext, parameter
-from paint_deposition.motion.path import SprayPath
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter
 
 
 class TcpOffset(Effect):

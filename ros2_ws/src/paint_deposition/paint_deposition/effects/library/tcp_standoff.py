@@ -1,7 +1,6 @@
 """A TCP calibrated too short or too long along the bell's axis."""
 
-from paint_deposition.effects.base import Effect, PathContext, parameter, read_only
-from paint_deposition.motion.path import SprayPath
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
 
 
 class TcpStandoff(Effect):

@@ -2,8 +2,7 @@
 
 import scipy
 
-from paint_deposition.effects.base import Effect, PathContext, parameter
-from paint_deposition.motion.path import SprayPath
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter
 
 
 class TcpTilt(Effect):

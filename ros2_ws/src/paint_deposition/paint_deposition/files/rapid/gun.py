@@ -53,8 +53,20 @@ class Gun(Interpreter):
     def __init__(self, modules: list[Module], start: Routine, signal: str | None) -> None:
         super().__init__(modules)
         name = next(module.name for module in modules if module.source == start.source)
-        signal = _gun_signal(list(self.reached(start.body)), signal, start.source)
-        self.program = RapidProgram(name, signal)
+        reached = list(self.reached(start.body))
+        signals = sorted({_signal_of(i) for i in reached} - {''})
+        words = ' '.join(signals)
+        if signal is not None:
+            if signal.lower() not in signals:
+                raise RecordingError(
+                    f'{start.source} never sets {signal}; it sets: {words or "none"}'
+                )
+            signals = [signal.lower()]
+        elif any(i.name.startswith('paint') for i in reached):
+            signals = []
+        elif len(signals) > 1:
+            raise RecordingError(f'{start.source} sets {words}; say which of them opens the gun')
+        self.program = RapidProgram(name, ''.join(signals))
         self.is_open, self.flow = False, 1.0
         self.brush: int | None = None  # None: no brush selected yet
         self._brush_table = ''
@@ -185,22 +197,6 @@ class Gun(Interpreter):
         if later:
             self.is_open = later[-1].on
         return spray
-
-
-def _gun_signal(reached: list[Instruction], given: str | None, source: str) -> str:
-    """The output that opens the gun: the given one, or the only one, '' for paint moves."""
-    signals = sorted({_signal_of(i) for i in reached} - {''})
-    if given is not None:
-        if given.lower() not in signals:
-            words = ' '.join(signals) or 'none'
-            raise RecordingError(f'{source} never sets {given}; it sets: {words}')
-        return given.lower()
-    if any(i.name.startswith('paint') for i in reached):
-        return ''
-    if len(signals) > 1:
-        words = ' '.join(signals)
-        raise RecordingError(f'{source} sets {words}; say which of them opens the gun')
-    return ''.join(signals)
 
 
 def _signal_of(i: Instruction) -> str:

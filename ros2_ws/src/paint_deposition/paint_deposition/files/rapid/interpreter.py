@@ -145,20 +145,19 @@ class Interpreter(Values):
             added = self.number(i.values[1], i.name) if step is None else step
             before = 0.0 if i.name == 'clear' else self.number(i.values[0], i.name)
             self.assign(i.values[0], before + added)
-        elif not self.act(i):
-            self._pass_over(i)
-
-    def _pass_over(self, i: Instruction) -> None:
-        if i.name not in PASSED_OVER:
+        elif self.act(i):
+            return
+        elif i.name not in PASSED_OVER:
             self.fail(
                 f'{i.name} is not understood, and may move the robot or the paint; take it out, '
                 'or write what it does as moves and SetBrush'
             )
-        if i.name.startswith('tpread') and i.values:
-            self.assign(i.values[0], Unknown(i.name, f'what {i.name} reads in line {i.line}'))
-        outputs = i.values[:1] if i.name.startswith(('set', 'reset')) else []
-        names = [part for node in outputs if isinstance(node, Node) for part in node.children[:1]]
-        self._passed.setdefault(' '.join([i.name, *map(str, names)]), {})[i.line] = None
+        else:
+            if i.name.startswith('tpread') and i.values:
+                self.assign(i.values[0], Unknown(i.name, f'what {i.name} reads in line {i.line}'))
+            output = i.values[0] if i.name.startswith(('set', 'reset')) and i.values else None
+            names = output.children[:1] if isinstance(output, Node) else []
+            self._passed.setdefault(' '.join([i.name, *map(str, names)]), {})[i.line] = None
 
     def _assignment(self, reference: Node, node: Any) -> None:
         self.line = reference.children[0].line

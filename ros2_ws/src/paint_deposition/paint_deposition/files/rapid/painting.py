@@ -5,11 +5,19 @@ from dataclasses import replace
 import numpy as np
 
 from paint_deposition.errors import quoted
-from paint_deposition.files.rapid.functions import Frame, frame, inverse, product
 from paint_deposition.files.rapid.gun import Gun, RapidMove, name_of
 from paint_deposition.files.rapid.interpreter import PASSED_OVER
 from paint_deposition.files.rapid.parser import Instruction, Module, Routine
-from paint_deposition.files.rapid.values import NOWHERE, PREDEFINED, RECORDS, Unknown
+from paint_deposition.files.rapid.values import (
+    NOWHERE,
+    PREDEFINED,
+    RECORDS,
+    Frame,
+    Unknown,
+    frame,
+    inverse,
+    product,
+)
 
 # Instruction -> number of its targets; the last is where it ends.
 MOVES = {

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 from paint_deposition.errors import PlanError, RecordingError
@@ -194,9 +193,11 @@ def module_text(
             'flows of single passes need brushes of their own; leave out --paint-moves'
         )
     run = [('', 'MoveJ', speeds[_speed(moves[0])], '', 'fine')]
-    for number, (before, move) in enumerate(pairwise(moves), start=2):
+    # Flow and brush, None where the gun is off.
+    guns = [(_flow(move), move.brush) if move.spraying else None for move in moves]
+    for number, move in enumerate(moves[1:], start=2):
         brush, instruction, trigger = '', 'MoveL', ''
-        switches = _gun(move) != _gun(before)
+        switches = guns[number - 1] != guns[number - 2]
         if paint_moves:
             instruction = 'PaintL' if move.spraying else 'MoveL'
             brush = f'SetBrush {(move.brush or 1) * move.spraying};' if switches else ''
@@ -217,11 +218,6 @@ def module_text(
         moves=run, off='SetBrush 0' if paint_moves else 'SetDO doGun,0',
         triggers=[] if paint_moves else ['gunOn', 'gunOff', *outputs],
     )  # fmt: skip
-
-
-def _gun(move: Move) -> tuple[float, int] | None:
-    """Flow and brush, None where the gun is off."""
-    return (_flow(move), move.brush) if move.spraying else None
 
 
 def _speed(move: Move) -> float:

@@ -32,9 +32,8 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.atomic import MOST_TEXT_MB, read_file, require_file
+from paint_deposition.files.atomic import MOST_TEXT_MB, read_file, require_file, require_small
 from paint_deposition.files.recordings import messages as definitions
-from paint_deposition.files.strict_yaml import require_small
 
 # The key under which the custom data of a plan's bag names its trigger topic.
 TRIGGER = 'trigger_topic'

@@ -1,7 +1,11 @@
-"""Reading a trajectory, poses and trigger, from a bag, and writing one."""
+"""The motion in a bag, poses and trigger, read and written.
+
+A trigger is AtomizerState, Bool, or a number in a field of any message.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,17 +14,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rosbags.typesys.store import Typestore
 
-from paint_deposition.errors import RecordingError
+from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings import messages as definitions
-from paint_deposition.files.recordings.bag_files import Bag
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic, custom_data
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
-from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES
-from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses
-from paint_deposition.files.recordings.triggers import BOOL_TYPE, with_trigger
+from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, Signal, stamp_ns
+from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses, read_tf_poses
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import (
+    ONLY_BRUSH,
+    SPRAYS_NOTHING,
+    Trajectory,
+    numbered,
+    relative_flow,
+)
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
@@ -30,6 +40,14 @@ POSE_TOPIC = '/atomizer/pose'
 STATE_TOPIC = '/atomizer/state'
 JOINT_TRAJECTORY_TYPE = 'trajectory_msgs/msg/JointTrajectory'
 JOINT_TOPIC = '/joint_trajectory'
+BOOL_TYPE = 'std_msgs/msg/Bool'
+# Fields of AtomizerState that are summarised while the gun sprays.
+SETTINGS = ('flow', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
+# A change of the trigger: its time, flow and brush from then on, and when it was logged [ns].
+Change = tuple[int, float, int, int]
+# For a trigger without stamps the log times are used, if those of the poses show that recorder and
+# robot have the same clock.
+MAX_CLOCK_OFFSET_S = 1.0
 
 
 def trajectory_of(
@@ -84,8 +102,6 @@ def motion_of(
         read, log_times_ns, name = read_joint_poses(bag, robot, pose_topic)
     else:
         if tf:
-            from paint_deposition.files.recordings.pose_topics import read_tf_poses
-
             read, log_times_ns = read_tf_poses(bag, *tf)
             name = f'transforms to {tf[1]}'
         else:
@@ -101,6 +117,113 @@ def motion_of(
     poses = np.hstack([read.positions_m, read.quaternions_xyzw])
     faults = StreamQuality.of(read.stamps_ns, poses).faults(name)
     return replace(read, warnings=(*read.warnings, *faults)), log_times_ns
+
+
+def choose_state_topic(bag: Bag, name: str) -> BagTopic:
+    """The named topic of a bag, AtomizerState or Bool."""
+    return bag.choose(name, (STATE_TYPE, BOOL_TYPE), 'state')
+
+
+def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarray) -> Trajectory:
+    """The motion, logged at (N,) int64, with the trigger of a topic.
+
+    That is AtomizerState (header stamps) or Bool (log times), or a field of other messages, with
+    the level beyond which the gun is on unless it is 0: ``/io.states[3]``, ``/io.level > 12``,
+    ``/io.closed < 1``. Raises RecordingError if there is no such topic or field, if it is no
+    number, or if it has no stamps and the clock of the robot is another than the recorder's.
+    """
+    signal, settings = Signal.parse(name), dict[str, float]()
+    topic = bag.find(signal.topic) if signal else None
+    if signal is None or topic is None or topic.type in (STATE_TYPE, BOOL_TYPE):
+        topic = choose_state_topic(bag, name)
+        by_log_time = topic.type == BOOL_TYPE
+        changes, settings, notes = _changes_of_states(bag, topic)
+    else:
+        changes, by_log_time, notes = _changes_of_signal(bag, topic, signal)
+    offset_s = float(np.median(log_times_ns - motion.stamps_ns)) * 1e-9
+    if by_log_time and abs(offset_s) > MAX_CLOCK_OFFSET_S:
+        raise RecordingError(
+            f'{name} in {bag.path} has no stamps, and the stream of poses was logged '
+            f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
+        )
+    rows: np.ndarray = np.empty(0, np.int64)
+    # Where the clock was set back, the order in which they came says of which stream they are; in
+    # the run of a part it says so as it did to the simulator.
+    if 'serial' in custom_data(bag.path) or np.any(np.diff(motion.stamps_ns) < 0):
+        logged = np.array([change[3] for change in changes], np.int64)
+        rows = np.searchsorted(np.maximum.accumulate(log_times_ns), logged)
+    else:
+        changes.sort(key=lambda change: change[0])
+    return replace(
+        motion, trigger_stamps_ns=np.array([change[0] for change in changes], np.int64),
+        trigger_flow=np.array([change[1] for change in changes], float),
+        trigger_brush=numbered([change[2] for change in changes]), trigger_rows=rows,
+        settings=settings, notes=(*motion.notes, *notes),
+    )  # fmt: skip
+
+
+def _changes_of_signal(
+    bag: Bag, topic: BagTopic, signal: Signal
+) -> tuple[list[Change], bool, list[str]]:
+    """The changes of a signal, whether they are by log time, and how it was interpreted."""
+    rows: list[tuple[int, float, int, bool]] = []
+    for _, log_time_ns, message in bag.decoded([topic.name]):
+        stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
+        value = signal.value(message)
+        if value is None:
+            found = [f'{topic.name}{path}' for path in definitions.numeric_fields(message)]
+            listed = ' '.join(found[: definitions.MOST_FIELDS]) + (
+                ' ...' if len(found) > definitions.MOST_FIELDS else ''
+            )
+            if not signal.path:
+                raise RecordingError(
+                    f'{topic.name} in {bag.path} is {topic.type}; name one of its fields: {listed}'
+                )
+            raise RecordingError(
+                f'{topic.name} in {bag.path} has no number or Bool at {signal.path}; '
+                + did_you_mean(topic.name + signal.path, found, f'there are: {listed or "none"}')
+            )
+        rows.append((stamp or log_time_ns, value, log_time_ns, bool(stamp)))
+    known = [row for row in rows if math.isfinite(row[1])]
+    if not known:
+        raise RecordingError(f'{topic.name} in {bag.path} has no numbers; record it again')
+    values = [value for _, value, *_ in known]
+    note = (
+        f'trigger {topic.name}{signal.path} is {min(values):.4g} to {max(values):.4g}: the gun '
+        f'is on where it is {"below" if signal.below else "above"} {signal.level:g}'
+    )
+    if left_out := len(rows) - len(known):
+        note += f'; {left_out} values that are no number are left out'
+    changes = [(at, float(signal.is_on(v)), ONLY_BRUSH, logged) for at, v, logged, _ in known]
+    return changes, not all(stamped for *_, stamped in rows), [note]
+
+
+def _changes_of_states(
+    bag: Bag, topic: BagTopic
+) -> tuple[list[Change], dict[str, float], list[str]]:
+    """The changes on a topic of AtomizerState or Bool, the median of each setting, and notes."""
+    changes: list[Change] = []
+    settings: dict[str, list[float]] = {}
+    without_flow, refused = 0, []
+    for _, log_time_ns, message in bag.decoded([topic.name]):
+        if topic.type == BOOL_TYPE:
+            change = TriggerChange(log_time_ns, relative_flow(bool(message.data)))
+        else:
+            try:
+                change = definitions.trigger_change(message)
+            except RecordingError as error:
+                refused.append(str(error))
+                continue
+            without_flow += bool(message.spraying) and change.flow == 0.0
+        changes.append((change.stamp_ns, change.flow, change.brush, log_time_ns))
+        for name in SETTINGS if change.flow > 0.0 else ():
+            value = getattr(message, name, np.nan)
+            if np.isfinite(value) and value != 0.0:  # 0 is what is not filled
+                settings.setdefault(name, []).append(value)
+    if refused:
+        bag.skipped[f'states on {topic.name}, the first of them an {refused[0]}'] = len(refused)
+    notes = [f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)'] * bool(without_flow)
+    return changes, {name: float(np.median(values)) for name, values in settings.items()}, notes
 
 
 def write_pose_bag(
@@ -150,43 +273,34 @@ def write_pose_bag(
         if drive:
             begin_ns = int(trajectory.stamps_ns[0])
             _add_topic(run, JOINT_TOPIC, JOINT_TRAJECTORY_TYPE)
-            write(JOINT_TOPIC, begin_ns, _joint_trajectory(types, begin_ns, drive))
+            point = types.types['trajectory_msgs/msg/JointTrajectoryPoint']
+            duration, none = types.types['builtin_interfaces/msg/Duration'], np.empty(0)
+            seconds = [duration(int(s), round(s % 1.0 * 1e9)) for s in drive.seconds.tolist()]
+            points = [
+                point(position, speed, none, none, at)
+                for position, speed, at in zip(drive.joints, drive.speeds, seconds, strict=True)
+            ]
+            joints = _header(types, begin_ns, ''), list(drive.arm.joints), points
+            write(JOINT_TOPIC, begin_ns, types.types[JOINT_TRAJECTORY_TYPE](*joints))
         for time_ns, is_pose, content in sorted(entries, key=lambda entry: entry[:2]):
             header = _header(types, time_ns, frame_id)
             if is_pose:
                 pose = _pose_message(types, 'Pose', 'Point', poses[content])
                 write(POSE_TOPIC, time_ns, types.types[POSE_TYPE](header, pose))
+            elif state_type == BOOL_TYPE:
+                write(STATE_TOPIC, time_ns, types.types[BOOL_TYPE](content[0] > 0.0))
             else:
-                write(STATE_TOPIC, time_ns, _state(types, state_type, header, *content))
+                # Neither set-points nor a programmed speed.
+                (flow, brush), unknown = content, float('nan')
+                settings = flow, unknown, unknown, unknown, brush, unknown, unknown
+                state = types.types[STATE_TYPE](header, flow > 0.0, *settings)
+                write(STATE_TOPIC, time_ns, state)
     return run.folder
-
-
-def _joint_trajectory(types: Typestore, begin_ns: int, drive: Drive) -> Any:
-    point = types.types['trajectory_msgs/msg/JointTrajectoryPoint']
-    duration = types.types['builtin_interfaces/msg/Duration']
-    none, rows = np.empty(0), zip(drive.seconds.tolist(), drive.joints, drive.speeds, strict=True)
-    points = [
-        point(position, speed, none, none, duration(int(time_s), round(time_s % 1.0 * 1e9)))
-        for time_s, position, speed in rows
-    ]
-    header = _header(types, begin_ns, '')
-    return types.types[JOINT_TRAJECTORY_TYPE](header, list(drive.arm.joints), points)
 
 
 def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = False) -> None:
     qos = [offered_qos(1 if latched else 500, latched=latched)]
     run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
-
-
-def _state(types: Typestore, kind: str, header: Any, flow: float, brush: int) -> Any:
-    """A Bool or an AtomizerState with relative flow and brush."""
-    if kind == BOOL_TYPE:
-        return types.types[BOOL_TYPE](flow > 0.0)
-    # Neither set-points nor a programmed speed.
-    unknown = float('nan')
-    return types.types[STATE_TYPE](
-        header, flow > 0.0, flow, *(unknown,) * 3, brush, unknown, unknown
-    )
 
 
 def _pose_message(types: Typestore, kind: str, place: str, values: Sequence[float]) -> Any:

@@ -227,12 +227,16 @@ def read_joint_poses(
         if not (wanted and rows):
             continue
         used.append(topic)
-        stamps, logged, values, faults = _without_repeats(rows, topic)
+        stamps, logged = np.array([row[:2] for row in rows], np.int64).T
+        values = np.array([row[2] for row in rows], dtype=float)
+        warnings += StreamQuality.of(stamps, values).repeats(topic)
+        new = RepeatedSamples().are_new(stamps, values)
+        new[new] = np.diff(np.maximum.accumulate(stamps[new]), prepend=-1) > 0
+        stamps, logged, values = stamps[new], logged[new], values[new]
         finite = np.isfinite(values[:, wanted]).all(axis=1)
         if not finite.all():
             what = f'joint states on {topic} with joints that are not finite'
             bag.skipped[what] += int(np.count_nonzero(~finite))
-        warnings += faults
         for column in wanted:
             if np.count_nonzero(finite) > len(columns.get(names[column], ([],))[0]):
                 columns[names[column]] = stamps[finite], logged[finite], values[finite, column]
@@ -253,18 +257,6 @@ def read_joint_poses(
     si = robot.in_si(values, f'{on_used} in {bag.path}')
     trajectory = robot.trajectory(clock[known], si, recorded, on_used)
     return replace(trajectory, warnings=tuple(warnings)), logged[known], on_used
-
-
-def _without_repeats(
-    rows: Sequence[tuple[int, int, list[float]]], topic: str
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
-    """Stamps (N,) that increase, log times (N,) and values (N, K), and what is wrong with them."""
-    stamps, logged = np.array([row[:2] for row in rows], np.int64).reshape(-1, 2).T
-    values = np.array([row[2] for row in rows], dtype=float)
-    faults = list(StreamQuality.of(stamps, values).repeats(topic))
-    new = RepeatedSamples().are_new(stamps, values)
-    new[new] = np.diff(np.maximum.accumulate(stamps[new]), prepend=-1) > 0
-    return stamps[new], logged[new], values[new], faults
 
 
 def _plain(name: str) -> str:

@@ -102,7 +102,7 @@ class RunWriter:
         )
         with self._write_errors():
             self._writer.start(profile='ros2', library='paint_deposition')
-            self._write_metadata_record()
+            self._writer.add_metadata('rosbag2', {'serialized_metadata': _yaml(self._metadata())})
             self._writer.flush()
 
     @property
@@ -166,7 +166,7 @@ class RunWriter:
             return self.folder
         with self._write_errors():
             self._writer.flush()
-            self._write_metadata_record()
+            self._writer.add_metadata('rosbag2', {'serialized_metadata': _yaml(self._metadata())})
             self._writer.finish()
             self._stream.flush()
             os.fsync(self._stream.fileno())
@@ -204,9 +204,6 @@ class RunWriter:
             # Closing the raw file discards the buffer, which cannot be written.
             self._raw.close()
             raise RecordingError(self._failure) from None
-
-    def _write_metadata_record(self) -> None:
-        self._writer.add_metadata('rosbag2', {'serialized_metadata': _yaml(self._metadata())})
 
     def _metadata(self) -> dict:
         duration_ns = self._last_ns - self._first_ns if self.message_count else 0

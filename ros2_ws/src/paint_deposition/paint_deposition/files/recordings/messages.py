@@ -2,8 +2,9 @@
 
 import functools
 import json
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -165,3 +166,67 @@ def trigger_change(state: Any) -> TriggerChange:
     if flow > 0.0 and brush < ONLY_BRUSH:
         raise RecordingError(f'atomizer state with brush {brush}: give 0 or more')
     return TriggerChange(stamp, flow, brush)
+
+
+MOST_FIELDS = 12
+SYNTAX = re.compile(
+    r'(?P<topic>[\w/~]+)(?P<path>(\.\w+|\[\d+\])*)\s*((?P<side>[<>])\s*(?P<level>[-+.\deE]+))?'
+)
+STEP = re.compile(r'\.(\w+)|\[(\d+)\]')
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A signal such as ``/io.states[3]``, ``/io.level > 12`` or ``/io.closed < 1``.
+
+    ``path`` of the field is '' for the field ``data`` of std_msgs. The signal is on above
+    ``level``, or under it if ``below`` is set.
+    """
+
+    topic: str
+    path: str
+    below: bool = False
+    level: float = 0.0
+
+    @staticmethod
+    def parse(text: str) -> 'Signal | None':
+        """Parse a signal, None for other text; raises RecordingError for an invalid level."""
+        match = SYNTAX.fullmatch(text.strip())
+        if match is None:
+            return None
+        try:
+            level = float(match['level'] or 0.0)
+        except ValueError:
+            raise RecordingError(
+                f"{text}: '{match['level']}' is no number; give a level such as 12"
+            ) from None
+        return Signal(match['topic'], match['path'], match['side'] == '<', level)
+
+    def value(self, message: Any) -> float | None:
+        """The number in a message, None where there is none."""
+        value = message
+        # The messages of std_msgs have one field.
+        try:
+            for name, index in STEP.findall(self.path) or [('data', '')]:
+                value = getattr(value, name) if name else value[int(index)]
+        except (AttributeError, IndexError, TypeError):
+            return None
+        known = isinstance(value, bool | int | float | np.bool_ | np.number)
+        return float(value) if known else None
+
+    def is_on(self, values: Any) -> Any:
+        """Whether the signal is on at a value, or at each of an array."""
+        return values < self.level if self.below else values > self.level
+
+
+def numeric_fields(value: Any, path: str = '') -> Iterator[str]:
+    """Paths to the numbers and Bools in a message."""
+    if isinstance(value, bool | int | float | np.bool_ | np.number):
+        yield path
+    elif is_dataclass(value):
+        for item in fields(value):
+            if item.name not in ('header', '__msgtype__'):
+                yield from numeric_fields(getattr(value, item.name), f'{path}.{item.name}')
+    elif isinstance(value, list | np.ndarray):
+        for index, inner in enumerate(value[: MOST_FIELDS + 1]):
+            yield from numeric_fields(inner, f'{path}[{index}]')

@@ -5,14 +5,13 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
-from paint_deposition.files.recordings.bag_files import Bag, BagTopic, listed_topics, open_bag
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic, listed_topics
 from paint_deposition.files.recordings.messages import (
     JOINT_TYPE,
     TF_TYPES,
@@ -75,11 +74,6 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
     return edges
 
 
-def moving_transforms(bag: Bag) -> list[Edge]:
-    """The transforms of a bag that come more than once and are not static."""
-    return [edge for edge in _edges(bag, static=False) if len(edge.stamps_ns) > 1]
-
-
 def read_frames(bag: Bag) -> FrameTree:
     """The frames of /tf_static, part_pose and /tf; a static one without direction is none."""
     tree = FrameTree()
@@ -120,7 +114,8 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
     between = tree.moving_between(source, target)
     if between is None:
         raise RecordingError(f"{bag.path}: no transforms lead from '{source}' to '{target}'")
-    moving = [edge for edge in moving_transforms(bag) if edge.child in between]
+    edges = [edge for edge in _edges(bag, static=False) if edge.child in between]
+    moving = [edge for edge in edges if len(edge.stamps_ns) > 1]
     if not moving:
         raise RecordingError(f"{bag.path}: '{source}' does not move in '{target}'")
     clock = max(moving, key=lambda edge: len(edge.stamps_ns))
@@ -263,16 +258,11 @@ class PoseSource:
         return own | figures | {'will_do': self.quality is not None}
 
 
-def summarise(path: Path | str, max_gap_s: float) -> tuple[list[BagTopic], list[PoseSource]]:
-    """The topics of a bag and its sources of poses: topics, joints, transforms that move.
+def sources_of_poses(bag: Bag, max_gap_s: float) -> Iterator[PoseSource]:
+    """The sources of poses in a bag: topics, joints, transforms that move.
 
-    A longer interval is a gap.
+    A longer interval than this is a gap.
     """
-    with open_bag(path) as bag:
-        return bag.topics, [*_sources(bag, max_gap_s)]
-
-
-def _sources(bag: Bag, max_gap_s: float) -> Iterator[PoseSource]:
     for topic in pose_topics(bag):
         if not topic.message_count:
             continue
@@ -301,7 +291,9 @@ def _sources(bag: Bag, max_gap_s: float) -> Iterator[PoseSource]:
             options += ' --angle-unit deg' if degrees else ''
             unit, faults = 'deg' if degrees else 'rad', tuple(quality.faults(topic.name))
             yield PoseSource(topic.name, topic.type, '', unit, quality, options, faults)
-    for edge in moving_transforms(bag):
+    for edge in _edges(bag, static=False):
+        if len(edge.stamps_ns) < 2:
+            continue
         quality = StreamQuality.of(edge.stamps_ns, edge.poses, edge.log_times_ns, max_gap_s)
         name, options = f'{edge.parent} to {edge.child}', f'--tf {edge.parent} {edge.child}'
         yield _of_poses(name, 'transforms', edge.parent, edge.poses, quality, options)

@@ -144,7 +144,11 @@ def find_table(
             for its, k in above
         ]
         count, _, best, row = max(ranked, key=lambda rank: rank[:2], default=(0, False, one, 0))
-        if count and _is_split_alike(best.rows, row):
+        # Numbers below headings of several cells stand in several cells, too. Else the headings
+        # are cut at a mark, or a blank, that is part of them: 'DFT [mil]'.
+        below = best.rows[row + 1 : row + 1 + MOST_LINES_ABOVE]
+        split = [len(its) > 1 for its in below if re.search(r'\d', ''.join(map(text_of, its)))]
+        if count and (len(best.rows[row]) == 1 or 2 * sum(split) >= len(split)):
             found.append((best, row))
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
         found_in = ' and '.join(one.form for one, _ in found)
@@ -175,16 +179,6 @@ def _on_two_rows(sheet: Sheet, first: int) -> Sheet | None:
         texts.append(f'{last} {below}'.strip())
     rows = [*sheet.rows[:first], texts, *sheet.rows[first + 2 :]]
     return replace(sheet, rows=rows, lines=[*sheet.lines[:first], *sheet.lines[first + 1 :]])
-
-
-def _is_split_alike(rows: list[list[Cell]], header: int) -> bool:
-    """Whether numbers below headings of several cells stand in several cells, too.
-
-    Else the headings are cut at a mark, or a blank, that is part of them: 'DFT [mil]'.
-    """
-    below = rows[header + 1 : header + 1 + MOST_LINES_ABOVE]
-    counts = [len(row) > 1 for row in below if re.search(r'\d', ''.join(map(text_of, row)))]
-    return len(rows[header]) == 1 or 2 * sum(counts) >= len(counts)
 
 
 def widest(sheet: Sheet) -> list[Cell]:

@@ -162,23 +162,18 @@ class ReadingTable(Table):
                 missing.append(k)
             else:
                 kept.append(k)
-        apart = self._apart_below(kept, places)
-        kept = kept[: len(kept) - apart]
-        count['of statistics'] += apart
+        # Last rows without place or label that stand apart from the table are statistics, too.
+        columns = [*places, *(self.at[name][0] for name in by[-1:])]
+        nameless = takewhile(
+            lambda k: columns and all(cell_at(self.rows[k], c) == '' for c in columns),
+            reversed(kept),
+        )
+        apart = min(nameless, default=0)
+        if apart and self.lines[apart] > self.lines[apart - 1] + 1:
+            count['of statistics'] += len(kept) - kept.index(apart)
+            del kept[kept.index(apart) :]
         parts = [f'{n} row{"s" * (n > 1)} {what}' for what, n in count.items() if n]
         return kept, missing, f'left out: {", ".join(parts)}' if parts else ''
-
-    def _apart_below(self, kept: list[int], places: list[int]) -> int:
-        """How many last rows are statistics: apart from the table, without place or label."""
-        columns = [*places, *(self.at[name][0] for name in self.named_by[-1:])]
-        nameless = [
-            *takewhile(
-                lambda k: columns and all(cell_at(self.rows[k], c) == '' for c in columns),
-                reversed(kept),
-            )
-        ]
-        first = nameless[-1] if nameless else 0
-        return len(nameless) * bool(first and self.lines[first] > self.lines[first - 1] + 1)
 
     def _orders(
         self, kept: list[int], missing: list[int], begin: int

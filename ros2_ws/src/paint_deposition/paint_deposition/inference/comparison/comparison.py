@@ -14,7 +14,6 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.film import Tabular
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.regions import Region, misfit_regions
 from paint_deposition.inference.fitting.study import Study
@@ -22,6 +21,7 @@ from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import geometry_by_experiment
 from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.part.zones import Zone
+from paint_deposition.tabular import Tabular
 
 
 @dataclass(frozen=True)
@@ -237,7 +237,8 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
     points = study.residuals(study.forward.predict_um(model))
     campaign = study.campaign
     predicted_um = points.predicted_um[campaign.means.owner]
-    readings = Residuals(campaign.readings.thickness_um, predicted_um, study.noise.sigma_um)
+    sigma_um = np.hypot(study.noise.sigma_um, study.texture_um[campaign.means.owner])
+    readings = Residuals(campaign.readings.thickness_um, predicted_um, sigma_um)
     dependences = [
         Dependence(one.name, *map(float, spearmanr(one.values, points.residual_um)))
         for one in study.covariates(model)

@@ -118,7 +118,8 @@ def _tried(
     stand = None
     if spot is not None:
         # The thickest film that may be sprayed on a spot: that wanted, else that measured.
-        most_um = study.campaign.target_um or float(study.measured_um.max())
+        target_um, _ = study.campaign.target_of(experiment)
+        most_um = target_um or float(study.measured_um.max())
         stand = StationarySpray.before(new, spot, model, most_um)
         if stand is None:
             return None

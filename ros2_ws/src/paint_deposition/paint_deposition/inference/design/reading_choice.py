@@ -24,14 +24,14 @@ from paint_deposition.inference.diagnosis.model_space import SIZES
 from paint_deposition.inference.diagnosis.testability import LEVEL
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.readings.gauge_noise import ASSUMED_FREEDOM, ENOUGH_REPEATS
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.gauge_places import (
+from paint_deposition.inference.readings.gauge_places import (
     FOOT_M,
     can_stand,
     from_edges_m,
     grid_places,
     spread_places,
 )
+from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
 
 # With fewer points than this the pattern's parameters alone take up all that is read.

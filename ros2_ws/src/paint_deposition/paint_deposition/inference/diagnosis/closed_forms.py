@@ -50,7 +50,9 @@ class ClosedForm:
     formula: str  # over the variable's name, for people
     code: str  # over x, in Python, with exp and log
     parameters: dict[str, Parameter]  # by name; positions and scales are those of the variable
-    probability: float  # among the forms tried, none of them being none
+    # Among the forms tried, with the constant and those beyond the band: the listed ones may sum
+    # to less than one.
+    probability: float
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """The factor, or the addition [um], at values of the variable."""

@@ -167,7 +167,7 @@ class ModelDiscrepancy:
     @staticmethod
     def of(study: Study, fit: Fit) -> 'ModelDiscrepancy':
         """Around a fit."""
-        model, campaign = fit.model, study.campaign
+        model, campaign, known = fit.model, study.campaign, fit.parameters.known
         owner = campaign.experiment_of
         film = np.maximum(study.forward.predict_um(model), 0.0)
         thickest = np.array([film[owner == k].max() for k in range(len(campaign.experiments))])
@@ -190,7 +190,7 @@ class ModelDiscrepancy:
             bool(repeated.any()),
             lengths_m,
             setting_of,
-            fit.parameters.known and fit.parameters.known.footprint,
+            known.footprint if known else None,
         )
 
     def around(self, study: Study, fit: Fit) -> 'ModelDiscrepancy':

@@ -123,16 +123,19 @@ class LeftOut:
     """Errors on readings left out, of a search and the laws learned after it.
 
     For each fold the choice is repeated with the other readings between the sets of effects that
-    were tried: as long as it is the same, it goes on to the next stage. The fits of the sets are
-    shared by all folds.
+    were tried: as long as it is the same, it goes on to the next stage. Where it is the same to
+    the end, its set is the final one, too. The fits of the sets are shared by all folds.
 
     Args:
         stages: of the search.
+        final: the set that remained of the last one.
         options: laws of any form that may be learned.
     """
 
-    def __init__(self, stages: Sequence[SearchStage], options: Sequence[Explanation]) -> None:
-        self.stages, self.options = stages, options
+    def __init__(
+        self, stages: Sequence[SearchStage], final: EffectSet, options: Sequence[Explanation]
+    ) -> None:
+        self.stages, self.final, self.options = stages, final, options
         self._known: dict[tuple[frozenset[str], bool], np.ndarray] = {}
 
     def errors_um(
@@ -154,10 +157,13 @@ class LeftOut:
         """(n, P) films with 0 to n - 1 laws, found without some readings (P,) [um]."""
         state = self.stages[0].here.state
         options = [option for option in self.options if option.learns not in without]
-        for stage, following in zip(self.stages, [*self.stages[1:], None], strict=True):
+        followers = [*(stage.here for stage in self.stages[1:]), self.stages[-1].here]
+        for stage, follower in zip(self.stages, followers, strict=True):
             found = stage.chosen(~out)
-            if following is None or found.names != following.here.names:
+            if found.names != follower.names:
                 break
+        else:
+            found = self.final
         nulls = NullModels.around(found, found.fit).select(~out)
         laws = choose_laws(nulls, [option.select(~out) for option in options], state.freedom)
         learned = [size * options[k].columns for k, size in laws]
@@ -191,10 +197,13 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     strength, covariate = max(found, key=lambda item: item[0])
     smooth = np.column_stack([np.ones(len(study)), _smooth(covariate.values)])
     weights = 1.0 / study.sigma_um[:, np.newaxis]
-    coefficients, *_ = np.linalg.lstsq(smooth * weights, fit.residual, rcond=None)
+    residuals = study.residuals(fit.predicted_um)
+    coefficients, *_ = np.linalg.lstsq(
+        smooth * weights, residuals.residual_um / study.sigma_um, rcond=None
+    )
     order = np.argsort(covariate.values)
     points = order[np.linspace(0, len(order) - 1, 15).astype(int)]
-    regions = misfit_regions(study, study.residuals(fit.predicted_um), fit.model)
+    regions = misfit_regions(study, residuals, fit.model)
     names = [experiment.name for experiment in study.campaign.experiments]
     shown = [name for name in names if name in {region.experiment for region in regions}]
     # The strongest contrast is the place to look at: what is widest may only balance it.

@@ -44,6 +44,9 @@ SURE = 0.7
 COARSENED = 2.0
 # Probability that a group holds the cause, if one of the alternatives is it.
 CREDIBLE = 0.95
+# Between sizes of the footprint that are three times as large as the next none is tried: standard
+# deviation of the logarithm within each.
+WITHIN_SIZE = np.log(3.0) / np.sqrt(12.0)
 # Simulations behind a p-value.
 DRAWS = 1000
 # Of each size of the footprint so many sizes of fields are kept at most, and none whose share of
@@ -151,6 +154,15 @@ class WeightedNull(NamedTuple):
             prior += LOG_ODDS_UNKNOWN
         return WeightedNull(sizes, null, evidence + prior)
 
+    def log_weight_of(self, rows: np.ndarray, freedom: float) -> float:
+        """Logarithm of the weight by some readings (P,) only."""
+        some = self.null.select(rows)
+        with_all, with_some = (
+            float(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
+            for null in (self.null, some)
+        )
+        return self.log_weight - with_all + with_some
+
 
 class ModelSpace:
     """What may be missing beside a model, whatever the size of the discrepancy.
@@ -209,7 +221,8 @@ class ModelSpace:
         """Probability of at least this much evidence for any cause if none acted.
 
         By simulation (Davison & Hinkley 1997) of the averaged evidence of all causes at all sizes,
-        which is computed for every draw as for the readings: nothing is chosen on the readings.
+        which is computed for every draw as for the readings. The fit, and the sizes of the
+        discrepancy with their shares among the draws, are those of the readings.
         """
         random = np.random.default_rng(seed)
         draws = []
@@ -271,14 +284,14 @@ class ModelSpace:
         found = [one.sizes for one in self.nature]
         logs = np.log([PRIOR.footprints[one.footprint] for one in found])
         middle = self.share @ logs
-        typical = float(np.exp(middle)), float(np.exp(np.sqrt(self.share @ (logs - middle) ** 2)))
-        # A deviation of the footprint shows from this many of its standard deviations on.
+        spread_of_logs = np.sqrt(self.share @ (logs - middle) ** 2 + WITHIN_SIZE**2)
+        # Of a hundred knots one is as many standard deviations off by chance once in twenty times.
         return DiscrepancyFigures(
             float(self.share @ [one.setting for one in found]),
             float(self.share @ [one.part for one in found]),
             float(self.share @ [self.discrepancy.lengths_m[one.length] for one in found]),
-            float(np.max(np.abs(mean), where=np.abs(mean) > 2.0 * sd, initial=0.0)),
-            typical,
+            float(np.max(np.abs(mean), where=np.abs(mean) > 3.5 * sd, initial=0.0)),
+            (float(np.exp(middle)), float(np.exp(spread_of_logs))),
             FootprintProfile(
                 footprint.radius_m,
                 footprint.flux,

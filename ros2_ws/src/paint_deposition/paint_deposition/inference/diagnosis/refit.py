@@ -88,7 +88,7 @@ def refit(
         f'{added.id} was added as asked; it is missing with a probability of '
         f'{percent(probability)} against the model as it was.'
     )
-    if probability > SURE:
+    if missing and probability > SURE:
         return state.diagnosis(p_value, 'effect_missing', reason)
     return state.diagnosis(p_value, 'undecided' if missing else 'none_missing', reason)
 

@@ -170,15 +170,14 @@ class EffectSet:
         return tuple(cause for cause in self.space.alone if cause != UNKNOWN)[:TRIALS]
 
     def log_weight_of(self, rows: np.ndarray) -> float:
-        """Logarithm of the weight by some readings (P,), at the best size of the discrepancy."""
-        some = self.best.null.select(rows)
-        evidence = some.log_evidence(some.deviation[:, np.newaxis], self.state.freedom)[0]
-        return (
-            evidence
-            + self.best.sizes.log_prior
-            + gain_of_sizes(self.fit, self.names)
-            + self.log_prior
-        )
+        """Logarithm of the weight by some readings (P,), at the best sizes of the discrepancy.
+
+        The laws may be off in every way.
+        """
+        there = [one for one in self.weighed if one.sizes == self.best.sizes]
+        weights = [one.log_weight_of(rows, self.state.freedom) for one in there]
+        evidence = float(np.logaddexp.reduce(weights))
+        return evidence + gain_of_sizes(self.fit, self.names) + self.log_prior
 
 
 @dataclass(frozen=True)
@@ -375,8 +374,8 @@ class Search:
         shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
         members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
         odds = self._log_odds(others, tried)
-        outside = odds.pop(UNKNOWN)
-        return tuple(members), inclusion_of([*odds.values()], [0.0, outside])
+        own = [odds.pop(member) for member in members]
+        return tuple(members), inclusion_of(own, [0.0, *odds.values()])
 
     def _log_odds(self, trial: EffectSet, larger: Mapping[str, EffectSet]) -> dict[str, float]:
         """Logarithm of the odds of each larger set against one, and of something unknown in it."""

@@ -234,7 +234,10 @@ class DiagnosisState:
             p_value,
             tuple(c.best for c in self.accepted),
             (*self.accepted, *others),
-            self.history,
+            tuple(
+                replace(step, fit=replace(step.fit, discrepancy=self.discrepancy))
+                for step in self.history
+            ),
             unknown,
             tuple(name for name in not_testable if name not in listed),
             detectable,

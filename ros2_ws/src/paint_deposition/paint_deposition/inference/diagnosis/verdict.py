@@ -10,7 +10,6 @@ from typing import Any, Literal
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.film.film import Tabular
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
@@ -23,6 +22,7 @@ from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
+from paint_deposition.tabular import Tabular
 
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
 
@@ -91,7 +91,8 @@ class Step:
     added: str  # effect id, '' for the model that the run started from
     fit: Fit  # of the model to the readings
     # On the fitted points [um], beside the estimated levels of the parts, see ``Study.residuals``;
-    # and on points left out, the model being refitted without them and their level not known.
+    # and on points left out, the model being refitted without them. Their level is not known but
+    # where no other part could tell it, see ``levels_untold``.
     rmse_um: float
     holdout_rmse_um: float
 
@@ -251,7 +252,7 @@ class Diagnosis(Tabular):
 
     @property
     def noise_floor_um(self) -> float:
-        """Standard deviation of the gauge at the points [um]."""
+        """Standard deviation of the points: gauge, texture, and what facets cost [um]."""
         return self.study.noise_floor_um
 
     @property

@@ -158,7 +158,8 @@ class Calibration:
     @property
     def chi_square_per_freedom(self) -> float:
         """About 1 where only the gauge's noise is left."""
-        return self.fit.chi_square / max(len(self.study) - len(self.fit.vector), 1)
+        freedom = max(len(self.study) - len(self.fit.vector), 1)
+        return self.fit.marginal.chi_square / freedom
 
 
 @on_one_thread
@@ -199,13 +200,16 @@ def calibrate(
         starts.append(model)
 
     def best_fit(study: Study) -> Fit:
-        fits = (study.fit(FreeParameters.of(one, *one.effects), 8, seed) for one in starts)
+        fits = (
+            study.fit(FreeParameters.of(one, *one.effects), 8, seed, study.nuisance)
+            for one in starts
+        )
         return min(fits, key=lambda fit: fit.objective)
 
     fit = best_fit(study)
     reaches = short_reaches(study.campaign, fit.model)
     moved = shifts(study, fit, reaches, best_fit)
-    values, pairs = estimates(fit, moved), correlations(fit)
+    values, pairs = estimates(fit.marginal, moved), correlations(fit.marginal, moved)
     widened = 'the intervals are widened by what the fit changes without the readings at the ends'
     warnings = [f'{reach}; {widened}' for reach in reaches]
     warnings += [*impossible_brushes(fit.model), *_warnings(study, fit, values, pairs)]
@@ -261,16 +265,17 @@ def _warnings(
         for pair in pairs
         if abs(pair.value) > 0.95
     ]
-    freedom = max(len(study) - len(fit.vector), 1)
+    squares = fit.marginal.chi_square / max(len(study) - len(fit.vector), 1)
     # Above this the gauge's noise does not explain the residuals.
-    if fit.chi_square > 2.0 * freedom:
+    if squares > 2.0:
         warnings.append(
-            f'residuals are {np.sqrt(fit.chi_square / freedom):.1f} times the noise of the gauge: '
+            f'residuals are {np.sqrt(squares):.1f} times the noise of the gauge: '
             'something is missing from the model, see paint diagnose'
         )
-    far = np.flatnonzero(np.abs(fit.residual) > OUTLIER_SIGMAS)
+    away = np.abs(study.residuals(fit.predicted_um).residual_um) / study.sigma_um
+    far = np.flatnonzero(away > OUTLIER_SIGMAS)
     if len(far):
-        campaign, worst = study.campaign, np.argmax(np.abs(fit.residual))
+        campaign, worst = study.campaign, np.argmax(away)
         label = campaign.readings.point[campaign.means.first[worst]]
         warnings.append(
             f'{len(far)} of {len(study)} points are off by more than {OUTLIER_SIGMAS:g} standard '

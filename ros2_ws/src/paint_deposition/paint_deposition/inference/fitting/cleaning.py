@@ -163,7 +163,7 @@ def condensed(campaign: Campaign, model: DepositionModel) -> Campaign:
         film_um = Forward(Campaign((cells,)), model.effects).predict_um(model)
         taken = replace(cells.readings, thickness_um=film_um + cells.readings.thickness_um)
         parts.append(cells.with_readings(taken))
-    return replace(campaign, experiments=tuple(parts), scanned=len(campaign.readings))
+    return replace(campaign, experiments=tuple(parts), scan=campaign)
 
 
 def _in_cells(part: Experiment, off_um: np.ndarray, most: int) -> Experiment:

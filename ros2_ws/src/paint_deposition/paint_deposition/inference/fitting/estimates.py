@@ -63,9 +63,9 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
     return tuple(found)
 
 
-def correlations(fit: Fit) -> tuple[Correlation, ...]:
+def correlations(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Correlation, ...]:
     """Correlations of all pairs of parameters, strongest first."""
-    spread = _spread(fit, scaled_covariance(fit))
+    spread = _spread(fit, scaled_covariance(fit, shifts))
     sigma = np.sqrt(np.diag(spread))
     matrix = spread / np.outer(sigma, sigma)
     names = _names(fit)

@@ -26,9 +26,9 @@ from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Mistake, Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.plausibility import check_unit
+from paint_deposition.kernel.blocks import box_centre_m
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.orientation import across_axis, downhill_axis
-from paint_deposition.part.points import box_centre_m
 
 # Prior probability that a campaign has a mistake of a kind, shared by all hypotheses of the kind.
 PRIOR_PROBABILITY = {'mirrored': 1e-3, 'exchanged': 1e-3, 'unit': 0.01, 'gun': 0.01}
@@ -142,7 +142,9 @@ class Weighed:
 
     def log_size(self, factor: float = 1.0) -> float:
         """Logarithm of the prior density of a film and a K1 as large as these over a factor."""
-        target_um = self.study.campaign.target_um
+        campaign = self.study.campaign
+        targets_um = [campaign.target_of(part)[0] for part in campaign.experiments]
+        target_um = float(np.mean(targets_um)) if all(targets_um) else 0.0
         # Film of the trade [um], or near its target: median, standard deviation of the logarithm.
         usual, spread = (target_um, 0.35) if target_um else (35.0, 0.7)
         film = abs(np.log(self.study.measured_um.mean() / factor / usual)) / spread

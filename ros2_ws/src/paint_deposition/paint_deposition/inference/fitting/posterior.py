@@ -47,10 +47,9 @@ def posterior_of(
     scale = parameters.scale
     covariance = scaled_covariance(fit.marginal, shifts) * np.outer(scale, scale)
     known = parameters.known.readings if parameters.known else ()
-    own = (experiment.taken.fingerprint for experiment in campaign.experiments)
     return Posterior.of(
         parameters.coordinates, parameters.offset + scale * fit.vector,
-        0.5 * (covariance + covariance.T), readings=(*known, *own),
+        0.5 * (covariance + covariance.T), readings=(*known, *campaign.fingerprints),
         process=campaign.settings, footprint=footprint,
     )  # fmt: skip
 
@@ -106,7 +105,8 @@ def prior_for(
     if known is None:
         return None, ()
     behind = set(known.readings)
-    twice = [e.name for e in campaign.experiments if e.taken.fingerprint in behind]
+    both = zip(campaign.experiments, campaign.fingerprints, strict=True)
+    twice = [experiment.name for experiment, fingerprint in both if fingerprint in behind]
     if twice:
         return None, (
             f'The posterior of the model file rests on the readings of '
@@ -209,7 +209,10 @@ class PatternShift:
 
     @property
     def usual(self) -> float:
-        """Distance that 95 % of jobs stay below if they differ as assumed."""
+        """Distance that 95 % of patterns stay below if jobs differ as assumed.
+
+        Of fits more do, as these are drawn toward what was known.
+        """
         return float(np.sqrt(chdtri(len(self.by_coordinate), 1.0 - 0.95)))
 
     @property
@@ -221,7 +224,7 @@ class PatternShift:
         name, most = max(self.by_coordinate.items(), key=lambda item: abs(item[1]))
         return (
             f'{self.distance:.1f} standard deviations from the calibration, most in {name} '
-            f'({most:+.1f}); 95 % of jobs stay below {self.usual:.1f}'
+            f'({most:+.1f}); at least 95 % of jobs stay below {self.usual:.1f}'
         )
 
     @property

@@ -84,6 +84,8 @@ class Study:
         for experiment in campaign.experiments:
             check_unit(experiment.readings)
         noise = gauge_noise(campaign.readings)
+        if campaign.scan and noise.source == 'stated':
+            noise = replace(noise, source='neighbours')
         campaign = campaign.without(noise.gross)
         return Study(campaign, Forward(campaign, effects), noise.select(~noise.gross))
 
@@ -94,9 +96,14 @@ class Study:
 
     @cached_property
     def sigma_um(self) -> np.ndarray:
-        """(P,) standard deviation of the points: gauge, texture, and what facets cost."""
+        """(P,) standard deviation of the points: gauge, texture, and what facets cost [um]."""
+        return np.hypot(self.gauge_um, self.texture_um)
+
+    @property
+    def texture_um(self) -> np.ndarray:
+        """(P,) the same without the gauge's, which repeats do not average out [um]."""
         facets_um = 0.0 if self.facet_um is None else self.facet_um
-        return np.hypot(np.hypot(self.gauge_um, self.texture.share * self.measured_um), facets_um)
+        return np.hypot(self.texture.share * self.measured_um, facets_um)
 
     def with_facets(self, model: DepositionModel) -> 'Study':
         """The study with what facets cost under a model, if it shows beside the noise."""
@@ -163,13 +170,13 @@ class Study:
     def notes(self) -> tuple[str, ...]:
         """Remarks on the readings for the user."""
         notes = [] if self.noise.source != 'assumed' else [
-            'The noise of the gauge was assumed (0.7 µm and 1 %); take 6 or more repeats for '
-            'p-values that can be trusted.'
+            'The noise of the gauge was assumed (0.7 µm and 1 %); take 6 or more second readings, '
+            'on a display that shows how they differ, for p-values that can be trusted.'
         ]  # fmt: skip
         notes += [] if self.texture.source == 'assumed' else [str(self.texture)]
-        if self.campaign.scanned:
+        if scan := self.campaign.scan:
             notes.append(
-                f'{self.campaign.scanned} readings were condensed to the means of {len(self)} '
+                f'{len(scan.readings)} readings were condensed to the means of {len(self)} '
                 'cells, but for parts with few: all figures, and residuals.csv, are of the cells.'
             )
         return (*notes, *self._facet_notes, *self.left_out)
@@ -330,9 +337,8 @@ class Study:
         return patch
 
     def passes(self, model: DepositionModel) -> np.ndarray:
-        """(P,) pass, from 0 in each experiment, that on average painted each point."""
-        means = next(c for c in self.covariates(model) if c.name == 'spray_pass').values
-        return np.round(means).astype(int)
+        """(P,) pass, from 0 in each experiment, that left most of the film at each point."""
+        return np.concatenate([rays.main_pass for rays in self.rays(model)])
 
 
 def _beside(columns: np.ndarray, misfit: np.ndarray) -> np.ndarray:

@@ -168,7 +168,7 @@ class Campaign:
         head: what the report says of part and batch, by key.
         target_um, tolerance_um: the film wanted outside of zones, and what it may differ [um];
             None: not known.
-        scanned: number of readings that were condensed to these, means of cells; 0: none.
+        scan: with the readings that were condensed to these, means of cells; None: none were.
 
     Raises:
         ReadingsError: two experiments have one name.
@@ -180,7 +180,7 @@ class Campaign:
     head: Mapping[str, str] = field(default_factory=dict)
     target_um: float | None = None
     tolerance_um: float | None = None
-    scanned: int = 0
+    scan: 'Campaign | None' = None
 
     def __repr__(self) -> str:
         names = ', '.join(e.name for e in self.experiments)
@@ -240,6 +240,11 @@ class Campaign:
         owner = self.experiment_of[self.means.owner]
         kept = (e.without(left_out[owner == k]) for k, e in enumerate(self.experiments))
         return replace(self, experiments=tuple(kept))
+
+    @property
+    def fingerprints(self) -> tuple[str, ...]:
+        """Of the readings of each experiment, as they were taken."""
+        return tuple(e.taken.fingerprint for e in (self.scan or self).experiments)
 
     @property
     def understood(self) -> tuple[str, ...]:

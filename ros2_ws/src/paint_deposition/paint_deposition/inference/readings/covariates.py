@@ -70,6 +70,14 @@ class Rays:
         total = np.maximum(self.share.sum(axis=0), 1e-12)
         return (self.share * values).sum(axis=0) / total
 
+    @property
+    def main_pass(self) -> np.ndarray:
+        """(P,) pass, from 0, that left most of the film at each point."""
+        number = self.experiment.path.spray_pass
+        by_pass = np.zeros((int(number.max()) + 1, self.share.shape[1]))
+        np.add.at(by_pass, number[self.rows].astype(int), self.share)
+        return by_pass.argmax(axis=0)
+
     @cached_property
     def along(self) -> dict[str, np.ndarray]:
         """Covariates by name, as arrays that broadcast to the M sub-steps and P points.

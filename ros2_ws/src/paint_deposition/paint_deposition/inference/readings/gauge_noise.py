@@ -108,7 +108,7 @@ class GaugeNoise:
     """Standard deviation of one reading."""
 
     sigma_um: np.ndarray  # (N,) of each reading [um]
-    source: str  # 'repeats', 'stated' or 'assumed'
+    source: str  # 'repeats', 'stated', 'assumed', or of a scan 'neighbours'
     degrees_of_freedom: float  # of the estimate; inf where stated, few where assumed
     # (N,) readings that contradict others at their point; the noise is without them.
     gross: np.ndarray

@@ -24,7 +24,12 @@ from std_msgs.msg import Bool
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage, open_bag
-from paint_deposition.files.recordings.bags import motion_of, trajectory_of
+from paint_deposition.files.recordings.bags import (
+    BOOL_TYPE,
+    choose_state_topic,
+    motion_of,
+    trajectory_of,
+)
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, stamp_ns
 from paint_deposition.files.recordings.pose_topics import (
@@ -35,7 +40,6 @@ from paint_deposition.files.recordings.pose_topics import (
     part_pose_topics,
     read_frames,
 )
-from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_topic
 from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
 from paint_deposition.nodes.runtime import topics

@@ -19,7 +19,6 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from paint_deposition.film.colour_scales import TABLE, ColourScale, film_scale
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.nodes.painting.painting_node import PaintingNode
@@ -28,6 +27,7 @@ from paint_deposition.nodes.runtime.topics import ColouredMesh, gun_topic, heade
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
+from paint_deposition.report.colour_scales import TABLE, ColourScale, film_scale
 
 # A subscriber that acknowledges nothing for so long does not delay the others.
 ACKNOWLEDGE_TIMEOUT_S = 5.0

@@ -13,9 +13,9 @@ from paint_msgs.msg import AtomizerState
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 
 from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, Robot
-from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.files.recordings.triggers import MAX_CLOCK_OFFSET_S, Signal
+from paint_deposition.files.recordings.messages import Signal, stamp_ns
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.motion.trajectory import ONLY_BRUSH

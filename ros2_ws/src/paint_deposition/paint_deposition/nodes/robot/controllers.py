@@ -20,7 +20,7 @@ import numpy as np
 from paint_msgs.msg import AtomizerState
 
 from paint_deposition.errors import PaintError, quoted
-from paint_deposition.files.recordings.triggers import MAX_CLOCK_OFFSET_S
+from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed

@@ -10,12 +10,12 @@ from matplotlib.markers import MarkerStyle
 from matplotlib.patches import Patch
 from matplotlib.transforms import Affine2D
 
-from paint_deposition.film.colour_scales import BARE_RGB, ColourScale, film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics, wanted_at
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
+from paint_deposition.report.colour_scales import BARE_RGB, ColourScale, film_scale
 from paint_deposition.report.pictures.part import HALO, PartPicture, View
 from paint_deposition.report.style import (
     BARE,

@@ -1,30 +1,34 @@
-"""A recommended index, a programme before and after, and places of the part and the gauge."""
+"""A recommended index, the gun over its part, a programme before and after, places of the part."""
 
 import math
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from paint_deposition.film.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
-from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.inference.design.reading_choice import ChosenReadings
-from paint_deposition.planning.driving import PartPlaces
-from paint_deposition.planning.improvement import FilmSummary, Improvement, PassChange
+from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.points import box_extent_m
+from paint_deposition.part.refinement import face_normals
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.improvement import Improvement
+from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.programme import STANDING_M, speed_along
 from paint_deposition.planning.recommendation import Recommendation
+from paint_deposition.report.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
 from paint_deposition.report.pictures.film import draw_tool_path, page_film
-from paint_deposition.report.pictures.part import (
-    PALE_HALO,
-    PartPicture,
-    label_points,
-)
+from paint_deposition.report.pictures.part import PartPicture, View, draw_triangles, dress
 from paint_deposition.report.style import (
     ACCENT,
     BEFORE,
+    COMPONENTS,
+    GRID,
     INK,
     MM,
     MUTED,
@@ -36,8 +40,8 @@ from paint_deposition.report.style import (
 )
 
 CHOSEN = '#c0392b'
-# The longer side of a part with its points [in].
-PART_IN = 9.0
+PART_COLOUR = '#b8c2cc'
+PASS_COLOURS = (ACCENT, *COMPONENTS, CHOSEN, '#2c5aa0')
 
 
 def write_uniformity(path: str | Path, recommendation: Recommendation) -> Path:
@@ -102,6 +106,109 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
     axes.set_ylim(0.0, top)
 
 
+def write_geometry_picture(
+    path: str | Path, surface: Surface, spray: SprayPath, geometry: SprayGeometry, title: str
+) -> Path:
+    """Draw part and motion from the gun, and from the right and the top of that picture."""
+    front = View.of_front(surface.outward, surface.down)
+    views = (front, *front.others())
+    corners = np.concatenate([surface.vertices_m, spray.position_m])
+    sizes = [np.maximum(np.ptp(view.flat(corners), axis=0), 1e-3) for view in views]
+    figure = new_figure(11.5, 8.0)
+    grid = figure.add_gridspec(
+        2, 2, width_ratios=_ratios(sizes[0][0], sizes[1][0]),
+        height_ratios=_ratios(sizes[0][1], sizes[2][1]),
+    )  # fmt: skip
+    size_m = float(np.linalg.norm(box_extent_m(corners)))
+    places, names = ((0, 0), (0, 1), (1, 0)), ('from the gun', 'from its right', 'from its top')
+    for place, view, name in zip(places, views, names, strict=True):
+        axes = figure.add_subplot(grid[place])
+        _draw_gun(axes, view, surface, spray, size_m)
+        axes.set_title(name, loc='left', fontsize=10, color=MUTED)
+    key = figure.add_subplot(grid[1, 1])
+    key.set_axis_off()
+    lines = [
+        Line2D([], [], color=PASS_COLOURS[0], linewidth=1.8, label='gun on, a colour a pass'),
+        Line2D([], [], color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)), label='gun off'),
+        Line2D(
+            [], [], color=PASS_COLOURS[0], linewidth=0.9, marker='.', markersize=4,
+            markerfacecolor=INK, label='tool z from the TCP (the dot is its tip)',
+        ),
+        Line2D([], [], color=PART_COLOUR, linewidth=6, label='the part'),
+    ]  # fmt: skip
+    key.legend(handles=lines, loc='upper left', frameon=False, fontsize=9, labelcolor=INK)
+    text = '\n'.join(fill(f'warning: {line}', 48) for line in geometry.warnings)
+    key.text(0.0, 0.0, text, fontsize=9, color=CHOSEN, transform=key.transAxes)
+    figure.suptitle(f'{title}\n{geometry.sentence}', x=0.02, ha='left', fontsize=11, color=INK)
+    return save_picture(figure, path)
+
+
+def _ratios(one: float, other: float) -> tuple[float, float]:
+    """Shares of a side for two views, neither of which becomes a sliver."""
+    share = float(np.clip(one / (one + other), 0.3, 0.7))
+    return share, 1.0 - share
+
+
+def _draw_gun(axes: Axes, view: View, surface: Surface, spray: SprayPath, size_m: float) -> None:
+    _draw_part(axes, view, surface, size_m)
+    on = spray.flow > 0.0
+    colours = [PASS_COLOURS[n % len(PASS_COLOURS)] for n in np.maximum(spray.spray_pass, 0)]
+    breaks = 1 + np.flatnonzero((on[1:] != on[:-1]) | (np.diff(spray.spray_pass) != 0))
+    numbered = set()
+    for rows in np.split(np.arange(len(spray)), breaks):
+        line = view.flat(spray.position_m[rows])
+        if not on[rows[0]]:
+            axes.plot(*line.T, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
+            continue
+        axes.plot(*line.T, color=colours[rows[0]], linewidth=1.8)
+        number = int(spray.spray_pass[rows[0]])
+        if number not in numbered and len(rows) > 1:
+            numbered.add(number)
+            axes.annotate(
+                str(number + 1), line[0], fontsize=7.5, color='white', ha='center', va='center',
+                bbox={'boxstyle': 'circle,pad=0.2', 'facecolor': colours[rows[0]], 'linewidth': 0},
+            )  # fmt: skip
+    # Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
+    travel, apart_m = np.cumsum(spray.dwell_s * spray.speed_m_per_s), 0.04 * size_m
+    evenly_m = np.arange(0.5 * apart_m, travel[-1], apart_m)
+    shown = np.unique(np.searchsorted(travel, evenly_m))
+    start = spray.position_m[shown]
+    ends = start + 0.09 * size_m * spray.rotation[shown, :, 2]
+    axes.add_collection(
+        LineCollection(
+            list(np.stack([view.flat(start), view.flat(ends)], axis=1)), linewidths=0.9,
+            colors=[colours[row] if on[row] else '#c5ccd3' for row in shown],
+        )
+    )  # fmt: skip
+    axes.plot(*view.flat(ends).T, linestyle='', marker='.', markersize=2.5, color=INK)
+    axes.set_aspect('equal', adjustable='datalim')
+    axes.margins(0.06)
+    axes.grid(True, color=GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    dress(axes, view)
+
+
+def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:
+    normals = face_normals(surface.vertices_m, surface.faces)
+    toward = normals @ view.toward
+    depth = surface.vertices_m[surface.faces].mean(axis=1) @ view.toward
+    order = np.argsort(depth)
+    # The back of a sheet is seen from some sides: it is darker.
+    light = np.where(toward >= 0.0, 0.75 + 0.25 * toward, 0.6)[order]
+    colours = np.array(to_rgba(PART_COLOUR)) * np.column_stack([light] * 3 + [np.ones(len(light))])
+    flat = view.flat(surface.vertices_m)
+    draw_triangles(axes, flat[surface.faces[order]], np.repeat(colours[:, np.newaxis], 3, axis=1))
+    axes.add_collection(LineCollection(list(view.flat(surface.rim_m)), colors=INK, linewidths=0.7))
+    # Smaller parts of a picture are marked: they would not be seen.
+    if np.ptp(flat, axis=0).max() < 0.02 * size_m:
+        axes.plot(*flat.mean(axis=0), marker='s', markersize=5, color=INK)
+        axes.annotate(
+            'the part', flat.mean(axis=0), xytext=(8, 4), textcoords='offset points', fontsize=9,
+            color=INK,
+        )  # fmt: skip
+    axes.update_datalim(flat)
+
+
 def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     """Draw the film before and after in one scale; below, the speeds along the passes."""
     part = PartPicture.of(result.surface)
@@ -122,7 +229,13 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
         part.draw(one, scale.rgba(laid.film_um, laid.film_um > 1.0))
         part.draw_zones(one, result.wanted.zones, driven)
         draw_tool_path(one, driven, part.view, low, high)
-        one.set_title(_title(name, laid), loc='left', fontsize=11, color=INK)
+        s = laid.statistics
+        title = (
+            f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
+            f'{s.min_um:.1f} to {s.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '
+            f'{laid.cycle_s:.1f} s'
+        )
+        one.set_title(title, loc='left', fontsize=11, color=INK)
     axes[1].set_ylabel('')
     colour_bar(top, axes, 'film [µm]', scale)
     top.legend(
@@ -137,8 +250,16 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     charts = bottom.subplots(rows, columns, squeeze=False, sharey=True)
     for chart in charts.ravel()[len(passes) :]:
         chart.set_axis_off()
+    retiming = result.retiming
+    programmes = ('before', retiming.original, BEFORE), ('after', retiming.programme, ACCENT)
     for chart, change in zip(charts.ravel(), passes, strict=False):
-        _draw_speeds(chart, change, result)
+        begin, end = change.place_m
+        places = np.linspace(begin + STANDING_M, end - STANDING_M, 121)
+        middle = 0.5 * (places[1:] + places[:-1]) - begin
+        for name, programme, colour in programmes:
+            speed = speed_along(programme, places)
+            chart.plot(middle, speed, color=colour, linewidth=1.6, label=name)
+        quiet(chart, 'along the pass [m]', '', f'pass {change.number}', size=9.0)
     for chart in charts[:, 0]:
         chart.set_ylabel('speed [m/s]', color=MUTED, fontsize=9.0)
     charts[0, 0].set_ylim(0.0, 1.08 * charts[0, 0].get_ylim()[1])
@@ -168,28 +289,6 @@ def _scale(result: Improvement) -> ColourScale:
         [one.film_um[result.wanted.region] for one in (result.before, result.after)]
     )
     return film_scale(np.quantile(films, [0.01, 0.99]))
-
-
-def _title(name: str, laid: FilmSummary) -> str:
-    s = laid.statistics
-    return (
-        f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
-        f'{s.min_um:.1f} to {s.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '
-        f'{laid.cycle_s:.1f} s'
-    )
-
-
-def _draw_speeds(axes: Axes, change: PassChange, result: Improvement) -> None:
-    """The speeds along a pass, before and after."""
-    begin, end = change.place_m
-    places = np.linspace(begin + STANDING_M, end - STANDING_M, 121)
-    middle = 0.5 * (places[1:] + places[:-1]) - begin
-    programmes = result.retiming.original, result.retiming.programme
-    for programme, colour, name in zip(
-        programmes, (BEFORE, ACCENT), ('before', 'after'), strict=True
-    ):
-        axes.plot(middle, speed_along(programme, places), color=colour, linewidth=1.6, label=name)
-    quiet(axes, 'along the pass [m]', '', f'pass {change.number}', size=9.0)
 
 
 def write_places(path: str | Path, places: PartPlaces) -> Path:
@@ -228,52 +327,3 @@ def write_places(path: str | Path, places: PartPlaces) -> Path:
     axes.set_ylim(low[1], high[1])
     axes.set_aspect('equal')
     return save_picture(figure, path)
-
-
-def write_measuring_picture(path: str | Path, chosen: ChosenReadings) -> Path:
-    """Draw the part with its numbered points, and how surely each effect would be found."""
-    part = PartPicture.of(chosen.surface)
-    width, height = PART_IN * (part.high_m - part.low_m) / (part.high_m - part.low_m).max()
-    bars = 4.3, 0.26 * len(chosen.power) + 1.2
-    figure = new_figure(width + bars[0] + 0.8, max(height + 1.2, bars[1], 4.0))
-    grid = GridSpec(1, 2, figure, width_ratios=[width, bars[0]])
-    draw_points(figure.add_subplot(grid[0]), chosen, part)
-    # A bar an effect, and what a grid of as many points would give.
-    axes, names = figure.add_subplot(grid[1]), sorted(chosen.power, key=chosen.power.__getitem__)
-    quiet(axes, 'probability of detection at the typical size [%]', '', size=9.0)
-    rows = np.arange(len(names))
-    axes.barh(rows, [100 * chosen.power[n] for n in names], 0.6, color=ACCENT, label='these')
-    axes.plot(
-        [100 * chosen.grid_power[n] for n in names], rows, '|', color=INK, markersize=11,
-        markeredgewidth=2, label=f'{len(chosen)} on a grid',
-    )  # fmt: skip
-    axes.axvline(5.0, color=BEFORE, linewidth=0.9, linestyle='--')
-    axes.set_yticks(rows, names, fontsize=8.5, color=MUTED)
-    axes.set(xlim=(0, 101), ylim=(-0.7, len(names) - 0.3))
-    legend(axes, loc='lower right')
-    return save_picture(figure, path)
-
-
-def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = None) -> None:
-    """Draw the part, its film and its points on axes of your own, seen from the gun's side."""
-    part = part or PartPicture.of(chosen.surface)
-    scale = film_scale(chosen.film_um)
-    room = 0.03 * (part.high_m - part.low_m).max()
-    part.dress(axes, part.low_m - room, part.high_m + room)
-    part.draw(axes, scale.rgba(chosen.film_um, chosen.film_um > NO_PAINT_UM))
-    part.draw_contours(axes, chosen.film_um, scale.low, scale.high)
-    places = part.view.flat(chosen.positions_m)
-    twice = np.isin(np.arange(len(chosen)), chosen.read_twice)
-    for which, marker, label in ((~twice, 'o', 'read once'), (twice, 's', 'read twice')):
-        axes.plot(
-            *places[which].T, marker, markersize=6, color='white', markeredgecolor=INK,
-            linestyle='', label=label,
-        )  # fmt: skip
-    names = [name.removeprefix('P').lstrip('0') for name in chosen.names]
-    per_m = 72.0 * PART_IN / (part.high_m - part.low_m).max()
-    label_points(axes, places, names, per_m, fontsize=8.5, color=INK, path_effects=PALE_HALO)
-    axes.set_title(
-        f'{len(chosen)} points for the gauge; lines: expected film [µm]', loc='left', fontsize=12,
-        color=INK, pad=24,
-    )  # fmt: skip
-    legend(axes, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1)

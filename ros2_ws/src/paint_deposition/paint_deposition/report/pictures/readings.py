@@ -1,4 +1,4 @@
-"""A model beside readings: along columns and rows, over each part, and as it was calibrated."""
+"""A model beside readings, along columns and rows and over each part, and where to take them."""
 
 from pathlib import Path
 from typing import Any, TypeVar
@@ -6,15 +6,18 @@ from typing import Any, TypeVar
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
+from matplotlib.gridspec import GridSpec
 
-from paint_deposition.film.colour_scales import film_scale, residual_scale
+from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.regions import interpolate_over_surface
+from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
+from paint_deposition.report.colour_scales import film_scale, residual_scale
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.film import page_film
-from paint_deposition.report.pictures.part import HALO, PartPicture, label_points
+from paint_deposition.report.pictures.part import HALO, PALE_HALO, PartPicture, label_points
 from paint_deposition.report.style import (
     ACCENT,
     BEFORE,
@@ -36,6 +39,8 @@ AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
 # A profile's two charts with the room around them [in].
 PROFILE_IN = PAGE_IN, 3.0
 LINE_POINTS = 600
+# The longer side of a part with its points [in].
+PART_IN = 9.0
 
 
 def part_figures(data: ReportData, index: int) -> list[Figure]:
@@ -261,3 +266,52 @@ def draw_agreement(
     axes.set_xlim(0.0, top)
     axes.set_ylim(0.0, top)
     axes.set_aspect('equal')
+
+
+def write_measuring_picture(path: str | Path, chosen: ChosenReadings) -> Path:
+    """Draw the part with its numbered points, and how surely each effect would be found."""
+    part = PartPicture.of(chosen.surface)
+    width, height = PART_IN * (part.high_m - part.low_m) / (part.high_m - part.low_m).max()
+    bars = 4.3, 0.26 * len(chosen.power) + 1.2
+    figure = new_figure(width + bars[0] + 0.8, max(height + 1.2, bars[1], 4.0))
+    grid = GridSpec(1, 2, figure, width_ratios=[width, bars[0]])
+    draw_points(figure.add_subplot(grid[0]), chosen, part)
+    # A bar an effect, and what a grid of as many points would give.
+    axes, names = figure.add_subplot(grid[1]), sorted(chosen.power, key=chosen.power.__getitem__)
+    quiet(axes, 'probability of detection at the typical size [%]', '', size=9.0)
+    rows = np.arange(len(names))
+    axes.barh(rows, [100 * chosen.power[n] for n in names], 0.6, color=ACCENT, label='these')
+    axes.plot(
+        [100 * chosen.grid_power[n] for n in names], rows, '|', color=INK, markersize=11,
+        markeredgewidth=2, label=f'{len(chosen)} on a grid',
+    )  # fmt: skip
+    axes.axvline(5.0, color=BEFORE, linewidth=0.9, linestyle='--')
+    axes.set_yticks(rows, names, fontsize=8.5, color=MUTED)
+    axes.set(xlim=(0, 101), ylim=(-0.7, len(names) - 0.3))
+    legend(axes, loc='lower right')
+    return save_picture(figure, path)
+
+
+def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = None) -> None:
+    """Draw the part, its film and its points on axes of your own, seen from the gun's side."""
+    part = part or PartPicture.of(chosen.surface)
+    scale = film_scale(chosen.film_um)
+    room = 0.03 * (part.high_m - part.low_m).max()
+    part.dress(axes, part.low_m - room, part.high_m + room)
+    part.draw(axes, scale.rgba(chosen.film_um, chosen.film_um > NO_PAINT_UM))
+    part.draw_contours(axes, chosen.film_um, scale.low, scale.high)
+    places = part.view.flat(chosen.positions_m)
+    twice = np.isin(np.arange(len(chosen)), chosen.read_twice)
+    for which, marker, label in ((~twice, 'o', 'read once'), (twice, 's', 'read twice')):
+        axes.plot(
+            *places[which].T, marker, markersize=6, color='white', markeredgecolor=INK,
+            linestyle='', label=label,
+        )  # fmt: skip
+    names = [name.removeprefix('P').lstrip('0') for name in chosen.names]
+    per_m = 72.0 * PART_IN / (part.high_m - part.low_m).max()
+    label_points(axes, places, names, per_m, fontsize=8.5, color=INK, path_effects=PALE_HALO)
+    axes.set_title(
+        f'{len(chosen)} points for the gauge; lines: expected film [µm]', loc='left', fontsize=12,
+        color=INK, pad=24,
+    )  # fmt: skip
+    legend(axes, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1)

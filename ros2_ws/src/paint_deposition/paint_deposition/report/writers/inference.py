@@ -93,7 +93,7 @@ def _write_diagnosis(
     start = start or ModelFile(result.history[0].model)
     models = [folder / 'model_before.yaml', folder / 'model.yaml']
     for file, steps in zip(models, (result.history[:1], result.history), strict=True):
-        known = result.posterior_at(steps[-1]), estimates(steps[-1].fit)
+        known = result.posterior_at(steps[-1]), estimates(steps[-1].fit.marginal)
         write_fitted(file, result.study, steps, *known, start)
     data = ReportData.of(result, start.history)
     return models + _write_results(folder, 'diagnosis.json', result.to_dict(), data, pictures)
@@ -177,12 +177,10 @@ def write_fitted(
         uncertainty.setdefault(section, {})[name] = float(f'{value.sigma:.3g}')
     fitted = _rounded(fit, steps[0].model.effects)
     few = {name: _short(getattr(posterior, name)) for name in ('mean', 'covariance')}
-    posterior = posterior.model_copy(update=few)
     whole = fitted.with_missing_brushes(start.model)
-    if whole is not fitted:
-        # It is that of some brushes only and would be taken for that of all.
-        return write_model(path, whole, header_comment, history, uncertainty, start.name)
-    write_model(path, fitted, header_comment, history, uncertainty, start.name, posterior)
+    # A posterior of some brushes only would be taken for that of all.
+    known = posterior.model_copy(update=few) if whole is fitted else None
+    write_model(path, whole, header_comment, history, uncertainty, start.name, known)
 
 
 def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:

@@ -32,19 +32,19 @@ from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.part.orientation import across_axis
-from paint_deposition.planning.driving import PartPlaces
 from paint_deposition.planning.faces import PartPlan
 from paint_deposition.planning.improvement import Improvement
+from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.film import film_picture
-from paint_deposition.report.pictures.motion import write_geometry_picture
 from paint_deposition.report.pictures.planning import (
+    write_geometry_picture,
     write_improvement_picture,
-    write_measuring_picture,
     write_places,
     write_uniformity,
 )
+from paint_deposition.report.pictures.readings import write_measuring_picture
 from paint_deposition.report.style import save_picture
 from paint_deposition.report.writers.write import input_files, with_provenance, write_film, written
 

@@ -1,11 +1,11 @@
-"""One function that writes every result, what the writers share, and films on disk."""
+"""One function that writes every result, one that draws it, and films on disk."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import singledispatch
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,11 +15,14 @@ from paint_deposition.files.atomic import replacing, write_json
 from paint_deposition.files.gauge_readings import table_text, write_predictions
 from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.files.provenance import origin
-from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
+from paint_deposition.report.colour_scales import film_scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Modules beside this one that register writers; those that import least come first.
 WRITERS = ('plans', 'inference')
@@ -63,6 +66,50 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
     with writable(folder):
         folder.mkdir(parents=True, exist_ok=True)
         return written(result, folder, **more)
+
+
+def plot(result: Any, ax: 'Axes | None' = None) -> 'Axes':
+    """Draw a result: a film, a plan or points on their part, a curve, or measured over predicted.
+
+    Args:
+        result: what a verb of this package returned.
+        ax: where to draw; default: matplotlib's present axes.
+
+    Returns:
+        The axes, for titles and more.
+    """
+    from paint_deposition.inference.comparison.comparison import Comparison
+    from paint_deposition.inference.design.reading_choice import ChosenReadings
+    from paint_deposition.inference.diagnosis.verdict import Diagnosis
+    from paint_deposition.inference.fitting.calibration import Calibration
+    from paint_deposition.planning.faces import PartPlan
+    from paint_deposition.planning.plan import Plan
+    from paint_deposition.planning.recommendation import Recommendation
+    from paint_deposition.report.pictures.film import draw_film
+    from paint_deposition.report.pictures.planning import draw_curve
+    from paint_deposition.report.pictures.readings import draw_agreement, draw_points
+
+    if ax is None:
+        from matplotlib import pyplot
+
+        ax = pyplot.gca()
+    if isinstance(result, Film | Plan | PartPlan):
+        above_um = result.statistics.painted_above_um
+        draw_film(ax, result.surface, result.film_um, result.path, above_um)
+    elif isinstance(result, ChosenReadings):
+        draw_points(ax, result)
+    elif isinstance(result, Recommendation):
+        draw_curve(ax, result)
+    elif isinstance(result, Calibration):
+        study = result.study
+        draw_agreement(ax, study.measured_um, result.fit.predicted_um, study.sigma_um)
+    elif isinstance(result, Comparison | Diagnosis):
+        of = result.comparisons[-1] if isinstance(result, Diagnosis) else result
+        found = of.readings
+        draw_agreement(ax, found.measured_um, found.predicted_um, found.sigma_um)
+    else:
+        raise TypeError(f'{type(result).__name__} is not a result that can be drawn')
+    return ax
 
 
 @contextmanager
