@@ -112,7 +112,7 @@ class AtomizerSource(PaintNode):
             signal.topic: self._on_signal_message for signal in self._signals.values()
         }
         self._values: dict[str, float] = {}
-        self._published, self._published_ns = '', 0
+        self._published, self._newest_ns = '', 0
         self.poses_published = 0
         # Of the robot's poses: their frame, when the last came, and how late they are sent.
         self._base, self._pose_s, self._clock_offset_s = '', time.monotonic(), 0.0
@@ -225,6 +225,12 @@ class AtomizerSource(PaintNode):
             else:
                 self._values[name] = value
         self._problems[topic] = problem
+        at_ns = stamp or info['source_timestamp'] or self.get_clock().now().nanoseconds
+        # Signals overtake each other, and a state is as new as the newest; unless a clock was set
+        # back.
+        if at_ns >= self._newest_ns - 1e9 * MAX_CLOCK_OFFSET_S:
+            at_ns = max(at_ns, self._newest_ns)
+        self._newest_ns = at_ns
         # All signals must be known.
         if problem or self._signals.keys() - self._values.keys():
             return
@@ -237,12 +243,6 @@ class AtomizerSource(PaintNode):
         state.programmed_speed_m_per_s = speed
         if str(state) != self._published:  # NaN does not equal itself
             self._published = str(state)
-            at_ns = stamp or info['source_timestamp'] or self.get_clock().now().nanoseconds
-            # Signals may overtake each other, and this state is the newest; unless a clock was
-            # set back.
-            if at_ns >= self._published_ns - 1e9 * MAX_CLOCK_OFFSET_S:
-                at_ns = max(at_ns, self._published_ns)
-            self._published_ns = at_ns
             state.header = header(self._base, at_ns)
             self._state_publisher.publish(state)
 
