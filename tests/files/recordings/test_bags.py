@@ -62,10 +62,8 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     state = pd.read_recording(folder, None, '/state')
     assert state.trigger_stamps_ns.tolist() == [START_NS + 70, START_NS + 90, START_NS + 95]
     assert state.trigger_flow.tolist() == [0.8, 0.0, 1.0]
-    # While it sprayed; a flow that is not known is no setting.
-    assert state.settings == {
-        'flow': 0.8, 'shaping_air_l_per_min': 0.0, 'bell_speed_rpm': 0.0, 'voltage_kv': 62.0,
-    }  # fmt: skip
+    # While it sprayed; a flow that is not known is no setting, nor is what is not filled.
+    assert state.settings == {'flow': 0.8, 'voltage_kv': 62.0}
     unused = pd.read_recording(folder)
     assert len(unused.trigger_stamps_ns) == 0
     assert unused.notes == (

@@ -14,6 +14,7 @@ from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import Part, ThicknessStats
 from paint_msgs.srv import ChangePart
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.lifecycle import TransitionCallbackReturn
 
 import paint_deposition as pd
 from brushes import two_brushes
@@ -150,6 +151,7 @@ def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
     node.set_parameters(parameters(model_file=str(tmp_path / 'other.yaml')))
     wait_until(lambda: not node.repainting, what='the end of the trial')
     assert 'brush 2 is not in the model' in node.model_problem
+    assert node.tasks['film']().values['model'] == str(tmp_path / 'brushes.yaml')
     source.send(later(WITHOUT_TRIGGER))
     assert painted(node, len(WITHOUT_TRIGGER)).max() > 1.0
     source.send_state(later(WITHOUT_TRIGGER).stamps_ns[-1], 0.0)
@@ -263,6 +265,26 @@ def test_a_film_is_kept_until_it_is_on_disk(simulator, robot, painted, change, t
     assert node.parts.status().level == OK
 
 
+def test_a_film_that_cannot_be_saved_keeps_the_node_as_it_is(simulator, robot, painted, change,
+                                                             tmp_path):  # fmt: skip
+    folder, node = tmp_path / 'films', simulator()
+    assert change(serial='1').success
+    robot(node).send(MOTION)
+    film = painted(node, len(MOTION))
+    folder.write_text('in the way')
+    node.trigger_deactivate()
+    for _ in range(2):
+        assert node.trigger_cleanup() == TransitionCallbackReturn.FAILURE
+    assert node.configured
+    assert 'films of 1 former parts are not saved' in node.tasks['state']().message
+    folder.unlink()
+    assert change(serial='2').success
+    saved = np.loadtxt(folder / '1/film.csv', delimiter=',', skiprows=1)[:, 3]
+    assert saved == pytest.approx(film, rel=1e-7)
+    assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
+    assert not node.configured
+
+
 def test_a_pose_that_is_refused_after_the_change_costs_no_film(simulator, robot, painted, change,
                                                                tmp_path):  # fmt: skip
     node = simulator(part_parent_frame='cell')
@@ -293,6 +315,10 @@ def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot,
     aside = [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
     future = asked(serial='1', mesh_file=str(broken), part_pose=aside)
     wait_until(lambda: node.parts.waiting, what='the request')
+    for step in (node.trigger_deactivate, node.trigger_cleanup):
+        assert step() != TransitionCallbackReturn.SUCCESS
+    assert node.active
+    assert node.reset() == (False, 'the part is being changed: call again after it')
     source.send(MOTION, frame_id=frame)
     wait_until(future.done, what='the answer')
     assert not future.result().success

@@ -15,6 +15,8 @@ from rosbags.interfaces import (
 )
 
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic
+from paint_deposition.files.recordings.messages import JOINT_TYPE, STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.parameters import (
     CONFIGURED,
@@ -26,6 +28,7 @@ from paint_deposition.nodes.runtime.parameters import (
 )
 from paint_deposition.nodes.runtime.topics import (
     MOST_PUBLISHERS,
+    TRUST_TOPIC,
     AdaptiveSubscription,
     gun_topic,
     header_stamp_ns,
@@ -33,6 +36,8 @@ from paint_deposition.nodes.runtime.topics import (
 )
 
 POSES, STATES = 'atomizer/pose', 'atomizer/state'
+# A message of these that is lost is lost motion, or paint.
+MOTION_TYPES = {POSE_TYPE, STATE_TYPE, JOINT_TYPE, *TF_TYPES}
 STATIC_TF, PART_POSE, PARAMETER_EVENTS = '/tf_static', 'part_pose', '/parameter_events'
 
 RECORDER = dict(
@@ -79,7 +84,7 @@ def default_topics(guns: Sequence[str]) -> list[str]:
     motion = [gun_topic(gun, topic) for gun in guns for topic in (POSES, STATES)]
     shares = [gun_topic(gun, 'thickness/field') for gun in guns if len(guns) > 1]
     return [
-        *motion, *shares, 'thickness/cloud', 'thickness/field', 'thickness/stats',
+        *motion, *shares, 'thickness/cloud', 'thickness/field', 'thickness/stats', TRUST_TOPIC,
         'comparison/stats', 'planned_path', PART_POSE, '/tf', STATIC_TF, '/diagnostics',
         PARAMETER_EVENTS,
     ]  # fmt: skip

@@ -20,6 +20,7 @@ from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.bags.initial_messages import TF, InitialMessages
 from paint_deposition.nodes.bags.recorded_topic import (
     MISSED_BEFORE_DISCOVERY,
+    MOTION_TYPES,
     PARAMETER_EVENTS,
     PART_POSE,
     POSES,
@@ -149,7 +150,7 @@ class RunRecorder(ManagedNode):
                 self._guarded(self.run.add_topic, run_topic)
                 self.recorded[name] = RecordedTopic(
                     self, run_topic, self._write, max_gap_ns, self._begun_ns,
-                    depth=5000 if is_pose or name == TF else 100,
+                    depth=5000 if types[0] in MOTION_TYPES else 100,
                 )  # fmt: skip
             except RecordingError as error:
                 self._refused.add(name)
