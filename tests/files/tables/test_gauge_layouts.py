@@ -167,6 +167,30 @@ def test_blank_cells_of_a_workbook_keep_their_numbers(tmp_path, file):
     assert '(2 of them without a reading: 6, 34)' in readings.understood
 
 
+@pytest.mark.parametrize('heading', ['Pos.', 'MP', 'Meas. point', 'Messpunkt Nr.', 'Point ID'])
+def test_labels_under_other_headings_are_known(file, heading):
+    path = file('b.csv', f'{heading},DFT\nA2,22\nA1,21\n')
+    listed = file('points.csv', 'Messpunkt;X [mm];Y [mm];Z [mm]\nA1;1,000;0;0\nA2;2,000;0;0\n')
+    with pytest.raises(ReadingsError, match='say decimal: comma'):
+        read_readings(path, listed)
+    readings = read_readings(path, listed, Layout(decimal=','))
+    assert readings.positions_m[:, 0].tolist() == [0.002, 0.001]
+
+
+@pytest.mark.parametrize(
+    ('listed', 'message'),
+    [
+        ('label,spot,x,y,z\n1,2,0,0,0\n', "in 'label', 'spot'; rename one of them in points.csv"),
+        ('point,x,y\n1,0,0\n', 'no columns are known as x, y, z'),
+        ('point,x,y,z\n', 'no points below the header'),
+        ('A1,0,0,0\n', "begins with 'A1 0 0 0'.; put a row of headings on top$"),
+    ],
+)
+def test_what_is_wrong_with_a_list_of_points_is_put_right_in_it(file, listed, message):
+    with pytest.raises(ReadingsError, match=message):
+        read_readings(file('b.csv', 'DFT\n20\n'), file('points.csv', listed))
+
+
 def test_points_that_are_not_listed_are_named_all_at_once(file):
     text = 'point,DFT\nA1,20\nB7,21\nB8,22\n'
     with pytest.raises(ReadingsError, match=r"line 3: no point 'B7' in .* line 4: no point 'B8'"):
@@ -182,10 +206,12 @@ def test_points_that_are_not_listed_are_named_all_at_once(file):
         ('DFT [mil]', 25.4), ('Dicke in mm', 1000.0), ('Trockenschichtdicke [um]', 1.0),
         ('DFT (thou)', 25.4), ('DFT in micrometers', 1.0), ('Dicke [Mikrometer]', 1.0),
         ('DFT (ist) [mil]', 25.4), ('Épaisseur [mil]', 25.4), ('Blechdicke;DFT [mil]', 25.4),
+        ('Dry film thickness [µm]', 1.0), ('Total DFT [mil]', 25.4), ('Average DFT', 1.0),
+        ('Paint thickness [µm]', 1.0), ('Sheet thickness;Clearcoat DFT [µm]', 1.0),
     ],
 )  # fmt: skip
 def test_headings_of_the_film_in_english_and_german(file, heading, um):
-    blech = ('Blech' in heading and '0,8;') or ''
+    blech = '0,8;' if ';' in heading else ''
     text = f'Punkt;x [m];y [m];z [m];{heading};Soll [µm];Std [µm]\nP;0;0;0;{blech}1,5;30;2\n'
     assert read_readings(file('a.csv', text)).thickness_um.tolist() == [1.5 * um]
 
@@ -310,6 +336,12 @@ def test_labels_of_listed_points_are_no_statistics(file):
         ('point;DFT\n1;24 µm\n2;1 mil\n', {}, "DFT is '24 µm'; .* write the one unit in the hea"),
         ('point;DFT 1;DFT 2\n;µm;mil\n1;24;1\n', {}, 'thickness is in mil and µm; give all of it'),
         ('Units;mils\n\npoint;DFT [µm]\n1;24\n', {}, 'thickness is in mil and µm; give all of'),
+        (
+            'Meas. pt,DFT\n' + ''.join(f'{k},2{k}\n' for k in (2, 1, 3, 4, 5, 6)),
+            {},
+            "the column 'Meas. pt' holds the labels of p.csv .* say columns: {point: Meas. pt}",
+        ),
+        ('Meas. pt,X [mm],Bake history\nA,1,2\n', {}, "columns: 'Meas. pt', 'X .mm.', 'Bake hist"),
         ('a,x,y,z,DFT\n,m,m,m,ell\nP,0,0,0,1\n', {}, "thickness .*; 'DFT' is in 'ell': give it"),
         ('point,DFT (ell)\nP,1\n', {}, "thickness .*; 'DFT .ell.' is in 'ell': give it in µm"),
         (

@@ -2,14 +2,14 @@
 
 import csv
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import StringIO
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from paint_deposition.errors import some
+from paint_deposition.errors import ReadingsError, some
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.tables.headings import LENGTHS, shown
 from paint_deposition.files.tables.reading_columns import (
@@ -84,7 +84,7 @@ def read_readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
         f'{path.name}: {"; ".join(filter(None, notes))}', layout.zero == 'film',
-        GUESSED in place_words, doubts, layers,
+        GUESSED in place_words, doubts, layers, read.heading('thickness'),
     )  # fmt: skip
     require_repeats_close(readings)
     return readings
@@ -113,7 +113,14 @@ class MeasuringPoints:
     @staticmethod
     def read(path: Path, layout: Layout, surface: Surface | None) -> 'MeasuringPoints':
         """Read a list: point label and x, y, z, or from_left, height."""
-        read = ReadingTable.read(path, False, Layout(unit=layout.unit))
+        try:
+            read = ReadingTable.read(path, False, Layout(unit=layout.unit))
+        except ReadingsError:
+            # What is said of the readings may settle what the list leaves open.
+            own = replace(layout, columns={}, zero='')
+            if not (layout.decimal or layout.sheet):
+                raise
+            read = ReadingTable.read(path, False, own)
         positions, normals, place_words = _places(read, surface)
         labels = read.labels
         if labels is None:
@@ -184,7 +191,9 @@ class MeasuringPoints:
             if count == len(self.labels):
                 if not {*order} <= {*self.labels}:
                     order = [self.labels[int(number) - 1] for number in order]
-                return order, 'by the order of the readings'
+                self._refuse_unknown_labels(readings, order)
+                unnamed = '' if readings.named_by else ' (no column is known as their label)'
+                return order, f'by the order of the readings{unnamed}'
         if again:
             raise readings.error(f"{again}; give a column 'point' with the labels of the points")
         figures = readings.figures_at_end
@@ -194,6 +203,19 @@ class MeasuringPoints:
             f'{self.path.name}: {f"{figures}; delete it if so" if figures else unknown}, or give '
             "a column 'point' with the labels of the points"
         )
+
+    def _refuse_unknown_labels(self, readings: ReadingTable, order: list[str]) -> None:
+        """Refuse readings in order where a column that is not known holds the points' labels."""
+        known = {column for columns in readings.at.values() for column in columns}
+        for k in {*range(len(readings.headings))} - known:
+            texts = readings.texts(k)
+            counts = len({*texts}) < len(texts) and all(map(str.isdigit, texts))
+            if {*texts} <= {*self.labels} and texts != order and not counts:
+                heading = readings.headings[k].text
+                raise readings.error(
+                    f"the column '{heading}' holds the labels of {self.path.name} but is not "
+                    f'known as the label; say columns: {{point: {heading}}}'
+                )
 
 
 def _counts_anew(readings: ReadingTable) -> str:
@@ -285,9 +307,11 @@ def _places(
         return positions, None, words
     missing = [axis for axis in AXES if not read.has(axis)]
     if len(missing) < len(AXES):
+        remedy = f'give it with columns: {{{missing[0]}: ...}} in the campaign'
+        if not read.has('thickness'):
+            remedy = f'rename it in {read.path.name}'
         raise read.error(
-            f'no column is known as {" or ".join(missing)} {shown(read.headings)}; '
-            f'give it with columns: {{{missing[0]}: ...}} in the campaign'
+            f'no column is known as {" or ".join(missing)} {shown(read.headings)}; {remedy}'
         )
     raise read.error(
         f'the readings have no coordinates {shown(read.headings)}; give x, y, z, or a list of '

@@ -73,7 +73,7 @@ class FilmSummary:
 
     @property
     def paint_cm3(self) -> float:
-        """Paint sprayed, as solids that a part which catches everything would get [cm3]."""
+        """Paint sprayed: solids, as an endless flat panel would get [cm3]."""
         return self.statistics.emitted_volume_cm3
 
     def figures(self) -> dict[str, float]:
@@ -257,10 +257,11 @@ class Improvement:
     def sentence(self) -> str:
         """The improvement in a sentence."""
         a, b = self.before, self.after
+        more = 100.0 * (b.paint_cm3 / a.paint_cm3 - 1.0)
         return (
             f'sigma_n {100 * a.sigma_n:.1f} → {100 * b.sigma_n:.1f} %, within {self.band} '
             f'{100 * a.within:.0f} → {100 * b.within:.0f} % of the area, paint '
-            f'{a.paint_cm3:.1f} → {b.paint_cm3:.1f} cm3, {a.cycle_s:.1f} → {b.cycle_s:.1f} s'
+            f'sprayed {more:+.0f} %, {a.cycle_s:.1f} → {b.cycle_s:.1f} s'
         )
 
     @property

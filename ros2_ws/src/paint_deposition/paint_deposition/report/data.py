@@ -32,7 +32,7 @@ SYMBOLS = {
     'K1_cm3_per_s': ('K1', 'deposited solids rate', 'cm³/s'),
     'K2': ('K2', 'weight of the centred Gaussian', ''),
     'K3': ('K3', 'asymmetry of the ring', ''),
-    'phi_rad': ('φ', 'phase of the asymmetry', 'rad'),
+    'phi_rad': ('φ', 'phase of the asymmetry', '°'),
     'r_m': ('r', 'radius of the ring', 'mm'),
     'sigma1_m': ('σ1', 'width of the ring', 'mm'),
     'sigma2_m': ('σ2', 'width of the centred Gaussian', 'mm'),
@@ -296,7 +296,7 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     of = [f'brush {brush.number}: ' if len(brushes) > 1 else '' for brush in brushes] or ['']
     for (whose, planar), name in product(zip(of, data.model.patterns, strict=True), PATTERN_NAMES):
         symbol, meaning, unit = SYMBOLS[name]
-        factor = 1e3 if unit == 'mm' else 1.0
+        factor = {'mm': 1e3, '°': float(np.degrees(1.0))}.get(unit, 1.0)
         value = words.number(factor * getattr(planar, name), 4)
         row = {'symbol': symbol, 'words': whose + meaning, 'unit': unit, 'value': value}
         if name in found:

@@ -81,6 +81,8 @@ def report_html(data: ReportData) -> str:
     films, git, diagnosis = film_rows(data), git_version(), data.diagnosis
     profiles, profile_legend = profile_figures(data)
     later = {(m.experiment, m.kind, m.label): m for m in data.comparisons[-1].misfits}
+    # What the tables begin with: the model before, or of models side by side the last.
+    shown = data.comparisons[-1 if data.names else 0]
     zone_films = {row['name']: row['film'].zones for row in films}
     return _filled(
         'report.html.j2',
@@ -97,8 +99,10 @@ def report_html(data: ReportData) -> str:
         blind=blind_rows(data),
         misfits=[
             {'before': m, 'after': later.get((m.experiment, m.kind, m.label), m)}
-            for m in data.comparisons[0].misfits
+            for m in shown.misfits
         ],
+        shown=shown,
+        of_model=f', {data.names[-1]}' if data.names else '',
         history=history_as_list(data.study, diagnosis.history, data.older) if diagnosis else [],
         notes=(diagnosis or data.study).notes,
         lined=all(len(profile.line_m) for profile in data.profiles),
@@ -142,8 +146,9 @@ def write_story(
     )
     residuals = residual_figures(data, index, PartPicture.of(data.experiments[index].surface))
     page = _filled(
-        'story.html.j2', **_verdict(data), gun=film.guns[0], unseen=unseen, improved=improved,
-        hidden=hidden, commands=commands, key_figures=key_figures(data),
+        'story.html.j2', **_verdict(data), model_file='diagnosis/model.yaml', gun=film.guns[0],
+        unseen=unseen, improved=improved, hidden=hidden, commands=commands,
+        key_figures=key_figures(data),
         film_figures=film_figures(film), unseen_figures=unseen_figures(unseen),
         improvement_figures=improvement_figures(improved), painted=_embedded(painted),
         residuals=list(map(_embedded, residuals)),
@@ -246,6 +251,9 @@ def _verdict(data: ReportData) -> dict[str, Any]:
         'first': history[0], 'last': history[-1], 'steps': list(pairwise(history)),
         'least': min((row['found'].probability for row in added), default=1.0),
         'best': min(errors, key=lambda name: errors[name], default=''),
+        'tolerance_um': min(
+            (t for _, t in map(data.study.campaign.target_of, data.experiments) if t), default=0.0
+        ),
         'sprays': data.proposals[1], 'SURE': SURE, 'ALPHA': ALPHA,
         # Deviations so large come from the gauge alone in 1 % of cases.
         'beyond_chance': fdtrc(len(points), freedom, points.chi_square_per_reading) < 0.01,
@@ -271,7 +279,7 @@ def key_figures(data: ReportData) -> list[Row]:
     first, last = diagnosis.history[0], diagnosis.history[-1]
     rows = []
     for label, name in (
-        (f'Error on {diagnosis.left_out} left out', 'holdout_rmse_um'),
+        (f'Error on {diagnosis.left_out} held out', 'holdout_rmse_um'),
         ('Error at fitted points', 'rmse_um'),
     ):
         before = f'{getattr(first, name):.2f}' if first is not last else ''
@@ -291,7 +299,12 @@ def film_figures(film: Film) -> list[Row]:
     return [
         ('Film', '', f'{s.mean_um:.1f}', 'µm on average'),
         ('Least and greatest', '', f'{s.min_um:.1f} to {s.max_um:.1f}', 'µm'),
-        ('Paint on the door', '', f'{100 * s.capture_fraction:.0f}', '% of what the bell gives'),
+        (
+            'Caught by the door',
+            '',
+            f'{100 * s.capture_fraction:.0f}',
+            '% of what a flat panel would get (not the transfer efficiency)',
+        ),
     ]
 
 
@@ -309,10 +322,11 @@ def improvement_figures(found: Improvement) -> list[Row]:
         before, after = (words.fixed(figure(of), digits) for of in (found.before, found.after))
         return label, before, after, unit
 
+    more = 100.0 * (found.after.paint_cm3 / found.before.paint_cm3 - 1.0)
     return [
         both('Standard deviation', '% of the mean', 1, lambda f: 100 * f.sigma_n),
         both('Area', f'% within {found.band}', 0, lambda f: 100 * f.within),
         both('Least film', 'µm', 1, lambda f: f.statistics.min_um),
-        both('Paint', 'cm³', 1, lambda f: f.paint_cm3),
+        ('Paint sprayed', '', words.fixed(more, 0, signed=True), '%'),
         both('Time', 's', 1, lambda f: f.cycle_s),
     ]

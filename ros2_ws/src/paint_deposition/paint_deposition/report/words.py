@@ -190,7 +190,9 @@ def fixed(value: float, digits: int = 2, signed: bool = False) -> str:
 
 
 def in_unit(unit: str, *values: float) -> tuple[str, ...]:
-    """Unit and values as they are printed; m and s as mm and ms if the first value is small."""
+    """Unit and values as they are printed; small m and s as mm and ms, rad as °."""
+    if unit == 'rad':
+        return '°', *(number(float(np.degrees(value))) for value in values)
     if unit in ('m', 's') and abs(values[0]) < 1.0:
         return f'm{unit}', *(number(1e3 * value) for value in values)
     return unit_words(unit), *(number(value) for value in values)

@@ -6,12 +6,13 @@ from paint_deposition.effects.base import Effect, PathContext, SprayPath, parame
 
 
 class TriggerLag(Effect):
-    """The flow F follows the commanded one C as tau dF/dt = C - F, rise and fall apart.
+    """Paint that comes late after the trigger opens, and goes on after it closes.
 
-    Acts on the flow: after the trigger opens it rises as 1 - exp(-t / tau_on), after it closes
-    it falls as exp(-t / tau_off); each sub-step gets its mean. tau_on x flow is missing at the
-    begin of a pass and tau_off x flow is added behind its end. What is left of the last opening
-    when the next one comes is taken along; of the one before that nothing.
+    The flow F follows the commanded one C as tau dF/dt = C - F, rise and fall apart. Acts on the
+    flow: after the trigger opens it rises as 1 - exp(-t / tau_on), after it closes it falls as
+    exp(-t / tau_off); each sub-step gets its mean. tau_on x flow is missing at the begin of a pass
+    and tau_off x flow is added behind its end. What is left of the last opening when the next one
+    comes is taken along; of the one before that nothing.
     """
 
     id = 'trigger_lag'

@@ -24,7 +24,9 @@ ALIASES = {
     'height': ('height', 'from bottom', 'hohe', 'hohe von unten', 'hoehe', 'von unten'),
     'point': (
         'point', 'location', 'spot', 'label', 'position', 'name', 'punkt', 'messpunkt',
-        'messstelle', 'stelle', 'repere', '箇所名', '測定箇所',
+        'messstelle', 'stelle', 'repere', '箇所名', '測定箇所', 'measuring point',
+        'measurement point', 'meas point', 'point no', 'point nr', 'point id', 'pos', 'mp',
+        'messpunkt nr', 'punkt nr',
     ),
     'number': ('no', 'nr', '#', 'number', 'nummer', 'id', 'reading no', 'reading number'),
     'row': ('row', 'zeile', 'reihe'),
@@ -111,3 +113,8 @@ NO_READING = {
 # Films before anything evaporates, as a comb shows them, and words that end as a thickness does.
 WET = re.compile(r'(wet|wft|nass)')
 OTHER_DICKEN = ('nass', 'soll', 'ziel', 'mindest', 'blech', 'wand', 'material', 'substrat')
+# What a column ends with that holds films where no other does, and what else has a thickness.
+FILM_ENDINGS = ('thickness', 'dft', 'film')
+OTHER_THICKNESS = {
+    'sheet', 'wall', 'material', 'substrate', 'panel', 'plate', 'steel', 'metal', 'glass', 'foil',
+}  # fmt: skip

@@ -75,9 +75,10 @@ class Heading:
         """
         text = text.strip().lstrip('#%').strip()
         small = re.sub(r'[\s_](mm?)_per_s$', r' [\1/s]', _small(text))
+        small = re.sub(r'%$', ' [%]', small)
         bracketed = BRACKETED.findall(small)
         known = [unit for unit in bracketed if unit in UNITS]
-        strange = [unit for unit in bracketed if not {*words_of(unit)} <= BESIDE | NOMINAL]
+        strange = [u for u in bracketed if u == '%' or not {*words_of(u)} <= BESIDE | NOMINAL]
         if units := known or strange:
             rest = BRACKETED.sub(lambda b: ' ' if b[1] == units[0] else b[0], small)
             return Heading(text, words_of(rest), SHORT.get(units[0], units[0]))
@@ -120,13 +121,14 @@ def find_table(
     known: Callable[[list[Heading]], int],
     sheet: str = '',
     columns: int = 0,
+    several: str = 'name one with sheet: ... in the campaign',
 ) -> tuple[Sheet, int | None]:
     """The sheet with a table, and the row of its headings; None where none is found.
 
     ``known`` counts the quantities that a row of headings names, 0 where a needed one is missing.
     ``sheet`` names a workbook's sheet; ``columns`` is how many a table without headings has at
-    least, 0 where that is not known. Raises ``refusal`` for a file that cannot be read, or with
-    tables in several sheets.
+    least, 0 where that is not known; ``several`` what to do about tables in several sheets.
+    Raises ``refusal`` for a file that cannot be read, or with tables in several sheets.
     """
     sheets = read_sheets(path, refusal)
     if sheet:
@@ -152,7 +154,7 @@ def find_table(
             found.append((best, row))
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
         found_in = ' and '.join(one.form for one, _ in found)
-        raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')
+        raise refusal(f'{path}: there are tables in {found_in}; {several}')
     # A lone heading is a column of numbers, not of what their decimal commas would cut apart.
     wide = [(one, row) for one, row in found if len(one.rows[row]) > 1]
     if found:
@@ -160,7 +162,14 @@ def find_table(
     wide_enough = [s for s in sheets if sum(len(r) >= columns for r in s.rows) > len(s.rows) / 2]
     if columns and wide_enough:
         return wide_enough[0], None
-    return max(sheets, key=lambda s: len(widest(s))), None
+    return max(sheets, key=lambda s: (_is_even(s), len(widest(s)))), None
+
+
+def _is_even(sheet: Sheet) -> bool:
+    """Whether most rows have as many cells as the widest one, and not one only."""
+    cells = [len(row) for row in sheet.rows[:MOST_LINES_ABOVE]]
+    most = max(cells, default=0)
+    return most > 1 and 2 * cells.count(most) > len(cells)
 
 
 def _on_two_rows(sheet: Sheet, first: int) -> Sheet | None:

@@ -56,7 +56,9 @@ class PoseTable(Table):
 
         With a robot, the columns are those of its joints.
         """
-        sheet, header = find_table(path, RecordingError, partial(_known, robot=robot))
+        alone = 'a motion is read from a file with one such sheet: save it by itself'
+        known = partial(_known, robot=robot)
+        sheet, header = find_table(path, RecordingError, known, several=alone)
         if header is None:
             first = ', '.join(map(text_of, sheet.rows[0])) if sheet.rows else 'none'
             if robot is not None:

@@ -9,10 +9,12 @@ from typing import Any
 from paint_deposition.errors import did_you_mean
 from paint_deposition.files.tables.gauge_formats import (
     ALIASES,
+    FILM_ENDINGS,
     FORMATS,
     LAYERS,
     NO_READING,
     OTHER_DICKEN,
+    OTHER_THICKNESS,
     OWN,
     WET,
     GaugeFormat,
@@ -98,6 +100,8 @@ def _known_columns(headings: list[Heading]) -> dict[str, list[int]]:
     if len(layers) > 1 and 'thickness' not in at:
         _assign(at, 'thickness', layers)
     also = [k for k, heading in enumerate(headings) if _begins_as_thickness(heading)]
+    ending = [k for k, heading in enumerate(headings) if _ends_as_thickness(heading)]
+    also = also or ending[: len(ending) == 1]
     return at if 'thickness' in at or not also else at | {'thickness': also}
 
 
@@ -172,6 +176,16 @@ def _begins_as_thickness(heading: Heading) -> bool:
     )
 
 
+def _ends_as_thickness(heading: Heading) -> bool:
+    """'Dry film thickness [µm]' or 'Total DFT', and no target, wet film or sheet of metal."""
+    words = heading.words
+    other = not NO_READING.isdisjoint(words) or not OTHER_THICKNESS.isdisjoint(words)
+    other |= any(map(WET.match, words)) or not _is_of_film(heading)
+    # A line that holds several headings is none.
+    whole = words[-1:] != () and words[-1] in FILM_ENDINGS and not re.search('[;,|]', heading.text)
+    return whole and not other
+
+
 def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout) -> str:
     """Why a file has no such table, and what to do.
 
@@ -186,6 +200,12 @@ def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout
             if isinstance(name, str) and name not in texts:
                 remedy = did_you_mean(name, texts, 'copy the heading')
                 return f"no column '{name}' for {quantity} {shown(headings)}; {remedy}"
+    wide = [row for row in sheet.rows if len(row) > 1] or sheet.rows
+    if all(any(map(is_value, row)) for row in wide):
+        remedy = 'put a row of headings on top'
+        if films:
+            remedy += ', or number its columns, columns: {point: 1, thickness: 2} in the campaign'
+        return f"there are no headings (it begins with '{' '.join(texts)}'); {remedy}"
     if not films:
         missing = 'no columns are known as x, y, z, or from_left, height'
         return f'{missing} {shown(headings)}; rename them'
@@ -241,9 +261,10 @@ def refuse_misleading(
         alike = quantity == 'thickness' and (of_user or layers or len(stems) == 1)
         if len(columns) > 1 and not alike:
             named = ', '.join(map(repr, texts))
-            raise table.error(
-                f'the {quantity} may be in {named}; name one, columns: {{{quantity}: ...}}'
-            )
+            remedy = f'name one, columns: {{{quantity}: ...}}'
+            if 'thickness' not in at:
+                remedy = f'rename one of them in {table.path.name}'
+            raise table.error(f'the {quantity} may be in {named}; {remedy}')
     # Numbers without a heading right of that of the thickness.
     films = [] if of_user else at.get('thickness', [])
     beside = range(max(films, default=len(every)) + 1, len(every))

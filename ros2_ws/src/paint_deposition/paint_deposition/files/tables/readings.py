@@ -87,7 +87,11 @@ class ReadingTable(Table):
         table.left_out += failed
         if not kept:
             table.refuse_errors()
-            raise table.error('no readings below the header')
+            missed = 'no readings below the header' if films else 'no points below the header'
+            if films and missing:
+                missed += f': {len(missing)} rows without one under '
+                missed += ', '.join(repr(table.headings[k].text) for k in thick)
+            raise table.error(missed)
         begin = table.lines[0] if bare else sheet.lines[header or 0] + 1
         table.orders = [*table._orders(kept, missing, begin)]
         table = table.select(kept)
@@ -359,7 +363,8 @@ def _rows_in(
     second table under other headings is refused; the same headings again are passed over.
     """
     known = _known(films, layout)
-    sheet, header = find_table(path, ReadingsError, known, layout.sheet, wide)
+    several = {} if films else {'several': 'save the one of the points by itself'}
+    sheet, header = find_table(path, ReadingsError, known, layout.sheet, wide, **several)
     headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []
     if wide:
         headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]

@@ -17,7 +17,7 @@ from paint_deposition.part.zones import NONE
 
 # The pattern has seven parameters, and a fit needs a few points more.
 FEWEST_POINTS = 10
-UNITS = {'mils': 25.4, 'mm': 1000.0}  # um in each
+UNITS = {'mil': 25.4, 'mm': 1000.0}  # um in each
 # No paint film is thinner than this everywhere; such numbers are mils or millimetres.
 THINNEST_FILM_UM = 3.0
 # Two units in one column leave a gap: sorted by size, neighbours differ by more than this factor.
@@ -29,10 +29,10 @@ def check_unit(readings: Readings) -> None:
     """Refuse readings in another unit."""
     highest = float(readings.thickness_um.max())
     if highest < THINNEST_FILM_UM:
-        unit = 'mils' if highest > 0.15 else 'mm'
+        unit = 'mil' if highest > 0.15 else 'mm'
         raise ReadingsError(
-            f'{readings.source}: thickness_um is at most {highest:g}; these look like {unit}, '
-            f'multiply by {UNITS[unit]:g}'
+            f"{readings.source}: '{readings.heading}' is at most {highest:g} µm; these look like "
+            f'{unit}, say unit: {{thickness: {unit}}} in the campaign'
         )
 
 
@@ -86,9 +86,10 @@ def _other_unit(
     readings: Readings, strange: np.ndarray, others_um: np.ndarray, unit: str
 ) -> ReadingsError:
     return ReadingsError(
-        f'{readings.source}: {len(strange)} of the readings are about {np.median(strange):.3g} '
-        f'where {np.median(others_um):.3g} µm is expected; they look like {unit}, multiply '
-        f'them by {UNITS[unit]:g}'
+        f"{readings.source}: {len(strange)} of the readings in '{readings.heading}' are about "
+        f'{np.median(strange):.3g} where {np.median(others_um):.3g} µm is expected; they look '
+        f'like {unit}, multiply them by {UNITS[unit]:g} or, if all are, say unit: '
+        f'{{thickness: {unit}}} in the campaign'
     )
 
 

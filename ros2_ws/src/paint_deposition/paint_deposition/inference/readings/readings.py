@@ -31,6 +31,7 @@ class Readings:
         zero_is_film: whether the user says that a reading of 0 is one.
         unit_is_guessed: whether nobody said what the unit of the positions is.
         doubts: what in their file may be no reading, for the user.
+        heading: what their file calls the film.
     """
 
     positions_m: np.ndarray
@@ -46,6 +47,7 @@ class Readings:
     unit_is_guessed: bool = False
     doubts: tuple[str, ...] = ()
     layer: np.ndarray = field(default_factory=lambda: np.array(''))
+    heading: str = 'thickness_um'
 
     def __post_init__(self) -> None:
         for name in ('session', 'layer'):

@@ -67,7 +67,7 @@ def film_picture(
         _draw_patches(figures, [(colour, f'up to {s.painted_above_um:g} µm')])
     _write(
         figures,
-        f'mean {s.mean_um:.1f} ± {s.std_dev_um:.1f} µm\n'
+        f'mean {s.mean_um:.1f} µm, standard deviation {s.std_dev_um:.1f} µm\n'
         f'{s.min_um:.1f} to {s.max_um:.1f} µm\n'
         f'painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²\n'
         f'{s.painted_volume_cm3:.1f} of {s.emitted_volume_cm3:.1f} cm³ on the part',

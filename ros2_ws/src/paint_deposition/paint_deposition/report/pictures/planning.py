@@ -229,11 +229,11 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
         part.draw(one, scale.rgba(laid.film_um, laid.film_um > 1.0))
         part.draw_zones(one, result.wanted.zones, driven)
         draw_tool_path(one, driven, part.view, low, high)
-        s = laid.statistics
+        s, more = laid.statistics, laid.paint_cm3 / result.before.paint_cm3 - 1.0
+        paint = 'paint sprayed ' + (f'{more:+.0%}' if abs(more) >= 5e-3 else 'as before')
         title = (
             f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
-            f'{s.min_um:.1f} to {s.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '
-            f'{laid.cycle_s:.1f} s'
+            f'{s.min_um:.1f} to {s.max_um:.1f} µm, {paint}, {laid.cycle_s:.1f} s'
         )
         one.set_title(title, loc='left', fontsize=11, color=INK)
     axes[1].set_ylabel('')
