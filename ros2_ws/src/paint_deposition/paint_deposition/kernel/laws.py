@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from types import CodeType, FunctionType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
@@ -42,7 +42,7 @@ def in_precision(law: Law, real: type) -> Law:
 
 
 def with_names(
-    function: FunctionType, names: Mapping[str, object], code: CodeType | None = None
+    function: Callable[..., Any], names: Mapping[str, object], code: CodeType | None = None
 ) -> FunctionType:
     """The function with other values for names of its module, and other code."""
     return FunctionType(
