@@ -38,7 +38,7 @@ NODES = {
     'web_view': (WebView, PANEL | {'port': 0}),
 }
 # Where tf2 is installed, and with use_sim_time.
-NOT_ALWAYS = {'/tf', '/tf_static', '/tf2_frames', '/clock'}
+NOT_ALWAYS = {'/tf', '/tf_static', '/clock'}
 # By every node's logger, and as it follows the parameters of others.
 OF_ALL = {'/rosout', '/parameter_events'}
 

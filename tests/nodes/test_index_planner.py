@@ -14,6 +14,7 @@ from rclpy.action import ActionClient
 
 import paint_deposition as pd
 from nodes.cell import PANEL_M, parameters, write_panel
+from nodes.processes import NodeProcess
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
@@ -180,3 +181,23 @@ def test_the_service_answers_while_passes_are_planned_and_cancel_ends_it(
     assert result.message == 'mesh_file is empty: name the mesh of the part'
     status, result, _ = pursue(mesh_file='nowhere.stl')
     assert 'nowhere.stl: no such mesh file' in result.message
+
+
+def test_a_goal_that_is_under_way_when_the_node_ends_is_aborted(
+    onlooker, wait_until, ros_domain, tmp_path
+):
+    mesh, heard = write_panel(tmp_path / 'panel.stl'), []
+    client = ActionClient(onlooker({}), PlanPasses, 'plan_passes')
+    with NodeProcess(
+        tmp_path / 'planner', 'index_planner', input_folders=f'[{tmp_path}]',
+        max_edge_length_m=0.01, speed_m_per_s=0.25,
+    ) as planner:  # fmt: skip
+        wait_until(client.server_is_ready, what='the action')
+        asked = PlanPasses.Goal(mesh_file=str(mesh))
+        sent = client.send_goal_async(asked, feedback_callback=heard.append)
+        wait_until(lambda: sent.done() and heard, what='feedback')
+        planner.interrupt_as_launch_does()
+        goal = sent.result()
+        wait_until(lambda: goal.status == GoalStatus.STATUS_ABORTED, what='the end')
+        assert planner.wait() == 0, planner.err
+    client.destroy()

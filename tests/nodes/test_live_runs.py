@@ -169,6 +169,13 @@ def test_a_film_is_in_doubt_while_its_recorder_is_stalled(
         wait_until(lambda: says(b'\x01', '/run_recorder has stalled'))
         recorder.go_on()
         wait_until(lambda: says(b'\x00', 'all that was sent'))
+        # One that has not heard the robot yet is not behind it.
+        silent = source.create_publisher(PoseProgress, 'atomizer/progress', topics.PROGRESS)
+        wait_until(lambda: silent.get_subscription_count() == 2)
+        silent.publish(PoseProgress(reporter='/robot'))
+        wait_until(lambda: ('', '/robot') in node.trust._reports)
+        node.trust.publish()
+        assert says(b'\x00', 'all that was sent')
     source.send(MOTION, slice(100, 102), frame_id='nowhere')
     wait_until(lambda: says(b'\x01', '2 poses refused'))
     node.reset()

@@ -82,6 +82,15 @@ class Simulator(DepositionSimulator):
         self.keep()
         super().change_part(*part)
 
+    def reset(self) -> tuple[bool, str]:
+        self.catch_up()
+        self.keep()
+        self.catch_up = lambda: None  # what comes from here on is of the next run
+        try:
+            return super().reset()
+        finally:
+            del self.catch_up
+
 
 class Cell(RuleBasedStateMachine):
     """A robot paints parts that change, as an operator and an integrator would let it."""
@@ -120,9 +129,7 @@ class Cell(RuleBasedStateMachine):
         self.simulator = Simulator(context=self.context, parameter_overrides=parameters(**chosen))
         self.robot, self.operator = Robot(self.context), Onlooker(self.context, {})
         self.reports: Counter[str] = Counter()
-        self.operator.create_subscription(
-            PoseProgress, 'atomizer/progress', lambda p: self.reports.update([p.reporter]), 100
-        )
+        self.operator.create_subscription(PoseProgress, 'atomizer/progress', self.count, 100)
         latched = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.robot.destroy_publisher(self.robot.state_publisher)
         self.robot.state_publisher = self.robot.create_publisher(
@@ -147,9 +154,17 @@ class Cell(RuleBasedStateMachine):
         self.change_part(0, 0, 0, False)
         self.robot.send_state(self.stamp_ns, 1.0, 1)
 
+    def count(self, report: PoseProgress) -> None:
+        """Reports, and the poses that the recorder has."""
+        self.reports[report.reporter] += 1
+        if report.reporter == RECORDER:
+            self.recorded = report.poses_received
+
     @staticmethod
     def is_heard(robot: Robot) -> bool:
         """By the simulator, the page and the recorder."""
+        if not robot.has_subscribers(3):  # which takes no time
+            return False
         here, elsewhere = robot.hearers()
         return here >= 2 and elsewhere >= 1
 
@@ -162,6 +177,7 @@ class Cell(RuleBasedStateMachine):
         )
         self.wait_until(lambda: self.is_heard(self.robot), what='the recorder')
         self.run, self.is_whole = name, False
+        self.recorded, self.sent_before_recorder = 0, self.sent
 
     def call(self, service, name: str, **fields):
         future = self.ask(service, name, **fields)
@@ -356,16 +372,24 @@ class Cell(RuleBasedStateMachine):
         assert left.received >= earliest, (left.received, earliest)
         self.leave(serial)
 
-    @rule()
-    def reset(self) -> None:
+    @rule(before=counts, after=counts)
+    def reset(self, before: int, after: int) -> None:
+        """While poses come, if the node is active."""
         self.settle()
-        self.simulator.keep()
-        self.of_left = [*self.of_part]
-        self.call(Trigger, f'{SIMULATOR}/reset')
-        if self.simulator.left.received:
+        if self.active:
+            self.poses(before, False)
+        earliest = len(self.of_part)
+        asked = self.ask(Trigger, f'{SIMULATOR}/reset')
+        if self.active:
+            self.poses(after, False)
+        self.wait_until(asked.done, what='the reset')
+        left = self.simulator.left
+        self.of_left = self.of_part[: left.received]
+        assert left.received >= earliest, (left.received, earliest)
+        if left.received:
             self.leave(self.simulator.parts.part.run)
         else:
-            self.painted_before += self.simulator.left.refused
+            self.painted_before += left.refused
 
     @rule()
     def pause(self) -> None:
@@ -397,7 +421,10 @@ class Cell(RuleBasedStateMachine):
         self.simulator.keep()
         run, of = self.folder / 'runs' / self.run, self.simulator.left
         of.stamps_ns = self.of_part
-        # What was sent is with the recorder, and in its file.
+        # What was sent is with the recorder, and in its file: while no poses come, it reports by
+        # the clock alone.
+        sent = self.sent - self.sent_before_recorder
+        self.wait_until(lambda: self.recorded == sent, what='all recorded')
         so_far = self.reports[RECORDER]
         self.wait_until(lambda: self.reports[RECORDER] >= so_far + WRITTEN_REPORTS, what='reports')
         if signal == 'cycle':

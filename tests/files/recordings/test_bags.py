@@ -62,10 +62,8 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     state = pd.read_recording(folder, None, '/state')
     assert state.trigger_stamps_ns.tolist() == [START_NS + 70, START_NS + 90, START_NS + 95]
     assert state.trigger_flow.tolist() == [0.8, 0.0, 1.0]
-    # While it sprayed; a flow that is not known is no setting.
-    assert state.settings == {
-        'flow': 0.8, 'shaping_air_l_per_min': 0.0, 'bell_speed_rpm': 0.0, 'voltage_kv': 62.0,
-    }  # fmt: skip
+    # While it sprayed; a flow that is not known is no setting, nor is what is not filled.
+    assert state.settings == {'flow': 0.8, 'voltage_kv': 62.0}
     unused = pd.read_recording(folder)
     assert len(unused.trigger_stamps_ns) == 0
     assert unused.notes == (
@@ -165,6 +163,16 @@ def test_poses_of_several_frames_are_brought_to_the_part(tmp_path):
         assert np.allclose(read.positions_m, written.positions_m, atol=1e-12)
         assert np.allclose(read.quaternions_xyzw, written.quaternions_xyzw, atol=1e-12)
     assert len(pd.read_recording(bare)) == 8
+    # However many are of a frame that nothing connects with the part.
+    poses = [(0, 'cell'), *((row, 'nowhere') for row in range(1, 19)), (19, 'cell')]
+    for row, frame in poses:
+        pose = messages.pose(written.stamps_ns[row], seen[0][row], seen[1][row], frame)
+        entries[row] = (*entries[row][:2], pose)
+    read = pd.read_recording(
+        write_bag(tmp_path / 'few', [('/tf_static', START_NS, static), *entries])
+    )
+    assert read.stamps_ns.tolist() == written.stamps_ns[[0, 19]].tolist()
+    assert np.allclose(read.positions_m, written.positions_m[[0, 19]], atol=1e-12)
 
 
 def test_poses_without_stamps_are_refused(tmp_path):

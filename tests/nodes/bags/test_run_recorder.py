@@ -18,7 +18,7 @@ from nodes.cell import FACING_PANEL, Robot, parameters
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.pose_stream import TriggerChange
-from paint_deposition.nodes.bags.run_recorder import LATE_S
+from paint_deposition.nodes.bags import run_recorder
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.topics import header, header_stamp_ns, state_message
@@ -135,20 +135,25 @@ def test_bad_input_is_reported_at_the_start(record):
             record(**values)
 
 
+@pytest.mark.parametrize('are_lost', [False, True])
 def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
-    record, ros_context, spin, onlooker, wait_until, tmp_path
+    record, ros_context, spin, onlooker, wait_until, still, tmp_path, monkeypatch, are_lost
 ):
     """One comes before its part is announced, others after the next part is.
 
-    They count that are in the queue of a recorder which was stopped for longer than it waits.
+    They count that are in the queue of a recorder which was stopped for longer than it waits, and
+    those that were lost on the way and come with the next heartbeat, three seconds later. The run
+    ends once it has what was sent for it.
     """
+    if not are_lost:
+        monkeypatch.setattr(run_recorder, 'LATE_S', 2.0)
     recorder, robot, place = record(), Robot(ros_context), (np.zeros(3), FACING_PANEL)
     spin(robot)
     parts = onlooker().create_publisher(Part, 'part', topics.LATCHED)
     wait_until(lambda: robot.has_subscribers(1), what='the recorder')
     robot.send_pose(START_NS, *place)
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose'), what='the first pose')
-    until_ns = time.time_ns() + 300_000_000
+    until_ns = time.time_ns() + (5_000_000_000 if are_lost else 300_000_000)
     at = header('part', START_NS + 9)
     carried = [state_message('', TriggerChange(START_NS + 5, 0.5))]
     parts.publish(Part(
@@ -156,18 +161,23 @@ def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
         states_sent_ns=[until_ns], states=carried,
     ))  # fmt: skip
     wait_until(lambda: recorder.run.folder.name == '1', what='the run')
+    if are_lost:
+        still(3.0)
     for k in range(1, 10):
         robot.send_pose(START_NS + k, *place)
     robot.send_state(START_NS + 5, 0.5)
-    threading.Event().wait(LATE_S + 0.1)  # nothing runs meanwhile
+    if not are_lost:
+        threading.Event().wait(2.1)  # nothing runs meanwhile
     wait_until(lambda: recorder.leaving.counts.get('/atomizer/pose') == 10, what='late ones')
     wait_until(lambda: time.time_ns() > until_ns)
     robot.send_pose(START_NS + 10, *place)
-    wait_until((tmp_path / 'run/metadata.yaml').is_file, what='the end of the first run')
+    robot.send_state(START_NS + 10, 0.5)
+    ended = (tmp_path / 'run/metadata.yaml').is_file
+    wait_until(ended, what='the end of the first run', timeout_s=5.0)
     robot.send_pose(START_NS + 11, *place)
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == 2, what='its own')
     recorder.close()
-    for run, poses in (('run', range(10)), ('1', range(10, 12))):
+    for run, poses, flows in (('run', range(10), [0.5]), ('1', range(10, 12), [0.5, 0.5])):
         motion = pd.read_recording(tmp_path / run, state_topic='/atomizer/state')
         assert motion.stamps_ns.tolist() == [START_NS + k for k in poses]
-        assert motion.trigger_flow.tolist() == [0.5]
+        assert motion.trigger_flow.tolist() == flows

@@ -14,11 +14,13 @@ from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import Part, ThicknessStats
 from paint_msgs.srv import ChangePart
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.lifecycle import TransitionCallbackReturn
 
 import paint_deposition as pd
 from brushes import two_brushes
 from nodes.cell import PANEL_M, offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.recordings.bag_files import open_bag
+from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import ERROR, OK
@@ -149,6 +151,7 @@ def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
     node.set_parameters(parameters(model_file=str(tmp_path / 'other.yaml')))
     wait_until(lambda: not node.repainting, what='the end of the trial')
     assert 'brush 2 is not in the model' in node.model_problem
+    assert node.tasks['film']().values['model'] == str(tmp_path / 'brushes.yaml')
     source.send(later(WITHOUT_TRIGGER))
     assert painted(node, len(WITHOUT_TRIGGER)).max() > 1.0
     source.send_state(later(WITHOUT_TRIGGER).stamps_ns[-1], 0.0)
@@ -262,6 +265,26 @@ def test_a_film_is_kept_until_it_is_on_disk(simulator, robot, painted, change, t
     assert node.parts.status().level == OK
 
 
+def test_a_film_that_cannot_be_saved_keeps_the_node_as_it_is(simulator, robot, painted, change,
+                                                             tmp_path):  # fmt: skip
+    folder, node = tmp_path / 'films', simulator()
+    assert change(serial='1').success
+    robot(node).send(MOTION)
+    film = painted(node, len(MOTION))
+    folder.write_text('in the way')
+    node.trigger_deactivate()
+    for _ in range(2):
+        assert node.trigger_cleanup() == TransitionCallbackReturn.FAILURE
+    assert node.configured
+    assert 'films of 1 former parts are not saved' in node.tasks['state']().message
+    folder.unlink()
+    assert change(serial='2').success
+    saved = np.loadtxt(folder / '1/film.csv', delimiter=',', skiprows=1)[:, 3]
+    assert saved == pytest.approx(film, rel=1e-7)
+    assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
+    assert not node.configured
+
+
 def test_a_pose_that_is_refused_after_the_change_costs_no_film(simulator, robot, painted, change,
                                                                tmp_path):  # fmt: skip
     node = simulator(part_parent_frame='cell')
@@ -292,6 +315,10 @@ def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot,
     aside = [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
     future = asked(serial='1', mesh_file=str(broken), part_pose=aside)
     wait_until(lambda: node.parts.waiting, what='the request')
+    for step in (node.trigger_deactivate, node.trigger_cleanup):
+        assert step() != TransitionCallbackReturn.SUCCESS
+    assert node.active
+    assert node.reset() == (False, 'the part is being changed: call again after it')
     source.send(MOTION, frame_id=frame)
     wait_until(future.done, what='the answer')
     assert not future.result().success
@@ -333,6 +360,27 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
         assert len(motion) == half
         assert np.array_equal(offline_um(of, motion), live)
     assert second.max() > 1.0
+
+
+def test_a_pose_that_comes_while_the_film_is_reset_is_of_the_run_that_begins(
+    simulator, robot, painted, change, monkeypatch
+):
+    node = simulator()
+    source, reset = robot(node), LiveFilms.reset
+    assert change(serial='1').success
+    source.send(WITHOUT_TRIGGER, slice(0, 10))
+    painted(node, 10)
+
+    def meanwhile(film: LiveFilms) -> None:
+        reset(film)
+        source.send(WITHOUT_TRIGGER, slice(10, 11))
+
+    monkeypatch.setattr(LiveFilms, 'reset', meanwhile)
+    node.reset()
+    painted(node, 1)
+    assert node.parts.part.run == '1_reset_1'
+    # The recorder goes by that.
+    assert node.parts.part.last_sent_ns < node.inputs[0].sent_ns
 
 
 @pytest.mark.parametrize('placed', [True, False])

@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PointStamped, PoseStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -14,8 +14,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, UInt16
 
 from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
+from paint_deposition.nodes.robot.robot_poses import JointPoses
+from paint_deposition.nodes.runtime.node import ERROR
 from robot_arm import JOINTS, URDF, tip_poses
 
 WAY = np.linspace([0.1, -0.2, 0.3, 0.0, 0.2, -0.1], [0.4, 0.1, 0.1, 0.3, -0.2, 0.5], 40)
@@ -154,6 +157,40 @@ def test_signals_are_flow_brush_and_programmed_speed(source, driver, viewer, wai
     assert [state.brush for state in states] == [3, 3, 4, 4]
     speeds = [state.programmed_speed_m_per_s for state in states]
     assert speeds == pytest.approx([0.35, 0.35, 0.35, 0.5], rel=1e-12)
+
+
+def test_a_signal_that_was_overtaken_takes_effect_with_the_newest(
+    source, driver, viewer, wait_until
+):
+    """Unless the clock was set back."""
+    source(trigger='/gun.point.x', flow='/paint.point.x')
+    robot = driver(('/gun', PointStamped), ('/paint', PointStamped))
+    for topic, at_ms, value, states in (
+        ('/paint', 9000, 0.5, 0), ('/gun', 10_000, 1.0, 1), ('/paint', 9980, 0.8, 2),
+        ('/paint', 5000, 0.7, 3),
+    ):  # fmt: skip
+        message = PointStamped()
+        message.header.stamp = Time(nanoseconds=at_ms * 1_000_000).to_msg()
+        message.point.x = value
+        robot.signals[topic].publish(message)
+        wait_until(lambda n=states: len(viewer.heard['atomizer/state']) == n, what=topic)
+    states = [viewer.decoded('atomizer/state', row) for row in range(3)]
+    assert [(stamp_ns(s.header) // 1_000_000, s.flow) for s in states] == [
+        (10_000, 0.5), (10_000, 0.8), (5000, 0.7),
+    ]  # fmt: skip
+    assert math.isnan(states[0].voltage_kv)
+
+
+def test_joint_states_that_are_refused_from_then_on_are_told(source, monkeypatch):
+    poses = JointPoses(source()._robot, 'joints', lambda *_: None)
+    for names in (JOINTS, JOINTS[:5]):
+        message = JointState(name=list(names), position=WAY[0, : len(names)].tolist())
+        poses.take('joints', message, {'source_timestamp': 0})
+    later_s = time.monotonic() + 10.0
+    monkeypatch.setattr(time, 'monotonic', lambda: later_s)
+    status = poses.status()
+    assert (status.level, 'joint states are refused: ' in status.message) == (ERROR, True)
+    assert 'wrist_roll' in status.message
 
 
 def test_a_trigger_alone_switches_a_robot_that_publishes_poses(

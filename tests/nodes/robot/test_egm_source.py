@@ -42,9 +42,10 @@ def doubles(values) -> bytes:
     return b''.join(field(1, value) for value in values)
 
 
-def egm_robot(number: int, tm_ms: int, time_us: int = 0) -> bytes:
+def egm_robot(number: int, tm_ms: int, time_us: int = 0, placed: bool = True) -> bytes:
     """EgmRobot with all that a controller sends, more than is read of it."""
     place = numbered([numbered(MM), numbered(WXYZ), numbered((180.0, 0.0, 90.0))])
+    place = place if placed else b''
     clock = field(4, numbered(divmod(time_us, 1_000_000))) if time_us else b''
     position = numbered([doubles(DEGREES), place, doubles((1500.0, 0.0))]) + clock
     state = field(1, 3)
@@ -148,3 +149,31 @@ def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(start, onlo
     assert joints.name[-2:] == ['joint_6', 'rail']
     assert joints.position[-2:].tolist() == pytest.approx([np.radians(-400.0), 1.5])
     wait_until(lambda: viewer.reports('egm_source: robot', '2 packets lost, 1 repeated'))
+
+
+@pytest.mark.parametrize(
+    ('axes', 'placed', 'told'),
+    [
+        (3, True, 'packets have 2 external axes'),
+        (0, False, 'packets have no pose: give EGM a tool'),
+    ],
+)
+def test_what_packets_lack_is_told(start, onlooker, wait_until, axes, placed, told):
+    names = [f'axis_{k}' for k in range(axes)]
+    node = start(
+        EgmSource, address='127.0.0.1', port=16511, external_joints=names,
+        external_scales=[1.0] * axes,
+    )  # fmt: skip
+    viewer = onlooker()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as robot:
+        numbers = iter(range(1, 10_000))
+
+        def says() -> bool:
+            robot.sendto(egm_robot(next(numbers), 1000, placed=placed), ('127.0.0.1', 16511))
+            return viewer.reports('egm_source: robot', told, b'\x02')
+
+        wait_until(says, what=told)
+    # Whatever else the thread fails with ends the process.
+    node._socket.close()
+    wait_until(node.finished.done, what='the end')
+    assert isinstance(node.finished.exception(), OSError)

@@ -289,6 +289,29 @@ def test_values_from_before_a_connection_are_not_called_late(ros_context):
     node.destroy_node()
 
 
+def test_a_value_of_the_future_counts_from_its_arrival(ros_context, monkeypatch):
+    """The first, too, which may be old."""
+
+    class Silent(OpcuaSource):
+        def follow(self) -> None:
+            self.stopped.wait()
+
+    node = Silent(context=ros_context, parameter_overrides=parameters(trigger='gun'))
+    states: list[AtomizerState] = []
+    monkeypatch.setattr(node._publisher, 'publish', states.append)
+    for value in (0.0, 1.0):
+        node.take('gun', value, time.time_ns() + 80_000_000_000)
+        assert stamp_ns(states[-1].header) <= time.time_ns()
+    assert 'gun arrives -80 s after its own time: set the clocks' in node.status().message
+    node.destroy_node()
+
+
+def test_a_library_that_is_missing_ends_the_node(start, monkeypatch):
+    monkeypatch.setattr(OpcuaSource, 'LIBRARY', 'nowhere_at_all.client')
+    with pytest.raises(PaintError, match='run: pip install nowhere_at_all'):
+        start(OpcuaSource, trigger='gun')
+
+
 @pytest.mark.parametrize(
     ('values', 'words'),
     [

@@ -9,33 +9,40 @@ If a node fails, all others are stopped and the launch ends with an error.
 
 from pathlib import Path
 
+from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
-from launch.substitutions import PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
-from launch_ros.substitutions import FindPackageShare
 
 PACKAGE = 'paint_deposition'
+SHARE = Path(get_package_share_directory(PACKAGE))
+PARAMETERS = str(SHARE / 'config' / 'cell.yaml')
 SWITCH = ['true', 'false']
+SWITCHES = ('allow_user_effects', 'publish_clock', 'page', 'use_sim_time')
 
-
-def shared(*path):
-    return PathJoinSubstitution([FindPackageShare(PACKAGE), *path])
-
-
-# Name, default and description; a default of 'true' or 'false' is a switch.
+# Name, default and description. What is empty is left to the parameter file.
 ARGUMENTS = (
     (
         'mesh',
-        shared('samples', 'door.stl'),
-        "The part's mesh: STL, PLY, OBJ, glTF, 3MF or STEP [path]",
+        '',
+        "The part's mesh: STL, PLY, OBJ, glTF, 3MF or STEP; empty: that of the parameter file, or "
+        'the sample door without a file of your own [path]',
     ),
-    ('model', '', 'Deposition model, model.yaml; empty: a 50 mm bell [path]'),
-    ('allow_user_effects', 'false', 'Run the Python code of effect files that a model names'),
-    ('urdf', '', 'Robot whose joint states give the poses; empty: none [path]'),
-    ('joint_topic', 'joint_states', "The robot's joint states, with urdf [topic]"),
-    ('base_frame', '', 'Frame in which tf gives the poses of tip_frame; empty: none [name]'),
+    ('model', '', 'Deposition model, model.yaml [path]'),
+    ('allow_user_effects', '', 'Run the Python code of effect files that a model names'),
+    (
+        'urdf',
+        '',
+        'Robot whose joint states, of the bag if there is one, give the poses; empty: none [path]',
+    ),
+    ('joint_topic', '', "The robot's joint states, with urdf and no bag [topic]"),
+    (
+        'base_frame',
+        '',
+        'Frame in which tf, of the bag if there is one, gives the poses of tip_frame; empty: none '
+        '[name]',
+    ),
     (
         'tip_frame',
         '',
@@ -49,14 +56,10 @@ ARGUMENTS = (
         '[topic]',
     ),
     ('bag', '', 'Bag to replay into the cell; empty: poses come from the robot [path]'),
-    ('pose_topic', '', "PoseStamped topic in the bag; empty: the bag's only one [topic]"),
-    (
-        'state_topic',
-        '',
-        'Gun trigger in the bag; empty: spraying whenever poses flow [topic]',
-    ),
-    ('rate', '1.0', 'Speed of the replay; 0: as fast as the nodes take poses [-]'),
-    ('publish_clock', 'true', 'Publish the time of the bag on /clock, which all cells share'),
+    ('pose_topic', '', 'PoseStamped topic in the bag [topic]'),
+    ('state_topic', '', 'Gun trigger in the bag [topic]'),
+    ('rate', '', 'Speed of the replay; 0: as fast as the nodes take poses [-]'),
+    ('publish_clock', '', 'Publish the time of the bag on /clock, which all cells share'),
     ('record', '', 'Folder to record the run in; empty: no recording [path]'),
     ('measurements', '', 'Gauge readings to compare with, CSV; empty: no comparison [path]'),
     ('page', 'false', 'Show the film on a page for browsers'),
@@ -65,15 +68,11 @@ ARGUMENTS = (
         'wait_for_subscribers',
         '',
         'Subscribers of the poses to wait for before the replay; empty: as many as are started '
-        'here [count]',
+        'here, which the parameter file cannot know [count]',
     ),
-    (
-        'parameters',
-        shared('config', 'cell.yaml'),
-        'Parameters of all nodes, which the arguments above override [path]',
-    ),
+    ('parameters', PARAMETERS, 'Parameters of all nodes; arguments that are given override them'),
     ('namespace', '', 'Namespace of the cell; topic names are relative to it'),
-    ('use_sim_time', 'false', 'Take time from /clock, which a replayed bag publishes'),
+    ('use_sim_time', '', 'Take time from /clock, which a replayed bag publishes'),
 )
 
 
@@ -83,7 +82,7 @@ def generate_launch_description():
             name,
             default_value=default,
             description=description,
-            choices=SWITCH if default in SWITCH else None,
+            choices=[*SWITCH, default] if name in SWITCHES else None,
         )
         for name, default, description in ARGUMENTS
     ]
@@ -108,42 +107,39 @@ def node_parameters(given):
         raise ValueError('tip_frame is given without base_frame: name the frame of the poses')
     if given['trigger'] and given['bag']:
         raise ValueError('trigger and bag are given: state_topic names the trigger in a bag')
-    mesh, model_file = {'mesh_file': given['mesh']}, {'model_file': given['model']}
-    model = model_file | {'allow_user_effects': switched(given, 'allow_user_effects')}
-    page = switched(given, 'page')
-    replay = {
-        'bag': given['bag'],
-        'pose_topic': given['pose_topic'],
-        'state_topic': given['state_topic'],
-        'rate': number(given, 'rate', float),
-        'publish_clock': switched(given, 'publish_clock'),
-        'wait_for_subscribers': number(given, 'wait_for_subscribers', int)
-        if given['wait_for_subscribers']
-        else 1 + sum((bool(given['record']), bool(given['measurements']), page)),
-    }
-    nodes = {'deposition_simulator': mesh | model, 'index_planner': mesh | model}
-    if given['urdf']:
-        nodes['atomizer_source'] = {
-            'urdf_file': given['urdf'],
-            'joint_topic': given['joint_topic'],
-            'trigger': given['trigger'],
-        }
-    elif given['base_frame']:
-        nodes['atomizer_source'] = {
-            'base_link': given['base_frame'],
-            'tip_link': given['tip_frame'],
-            'trigger': given['trigger'],
-        }
-    elif given['trigger']:
-        nodes['atomizer_source'] = {'trigger': given['trigger']}
+    if given['joint_topic'] and given['bag']:
+        raise ValueError('joint_topic and bag are given: the bag has the joint states')
+    mesh, page = given['mesh'], given['page'] == 'true'
+    if not mesh and given['parameters'] == PARAMETERS:
+        mesh = str(SHARE / 'samples' / 'door.stl')
+    part = said(mesh_file=mesh)
+    model_file = said(model_file=given['model'])
+    painting = part | model_file | switches(given, 'allow_user_effects')
+    nodes = {'deposition_simulator': painting, 'index_planner': painting}
     if given['bag']:
-        nodes['bag_player'] = replay
+        listeners = 1 + sum((bool(given['record']), bool(given['measurements']), page))
+        names = 'bag', 'pose_topic', 'state_topic', 'urdf'
+        nodes['bag_player'] = said(**{name: given[name] for name in names})
+        nodes['bag_player'] |= switches(given, 'publish_clock') | said(
+            tf=given['base_frame'] and [given['base_frame'], given['tip_frame'] or 'tool0'],
+            rate=number(given, 'rate', float),
+        )
+        waited_for = number(given, 'wait_for_subscribers', int)
+        nodes['bag_player']['wait_for_subscribers'] = listeners if waited_for == '' else waited_for
+    elif given['urdf'] or given['base_frame'] or given['trigger']:
+        nodes['atomizer_source'] = said(
+            urdf_file=given['urdf'],
+            joint_topic=given['joint_topic'],
+            base_link=given['base_frame'],
+            tip_link=given['tip_frame'],
+            trigger=given['trigger'],
+        )
     if given['record']:
-        nodes['run_recorder'] = mesh | model_file | {'output_directory': given['record']}
+        nodes['run_recorder'] = part | model_file | {'output_directory': given['record']}
     if given['measurements']:
-        nodes['model_comparison'] = mesh | model | {'measurements_file': given['measurements']}
+        nodes['model_comparison'] = painting | {'measurements_file': given['measurements']}
     if page:
-        nodes['web_view'] = mesh
+        nodes['web_view'] = part
     return nodes
 
 
@@ -160,28 +156,32 @@ def cell_node(given, name, parameters):
     # Text stays text, also where it looks like a number.
     arguments = {
         key: ParameterValue(value, value_type=str) if isinstance(value, str) else value
-        for key, value in parameters.items()
+        for key, value in (parameters | switches(given, 'use_sim_time')).items()
     }
     return Node(
         package=PACKAGE,
         executable=name,
         name=name,
         namespace=given['namespace'],
-        parameters=[
-            given['parameters'],
-            arguments | {'use_sim_time': switched(given, 'use_sim_time')},
-        ],
+        parameters=[given['parameters'], *([arguments] if arguments else [])],
         output='screen',
         on_exit=ended,
     )
 
 
-def switched(given, argument):
-    return given[argument] == 'true'
+def said(**values):
+    """The values that are not empty; the others are left to the parameter file."""
+    return {name: value for name, value in values.items() if value != ''}
+
+
+def switches(given, name):
+    """A switch as a parameter of the same name, unless it is empty."""
+    return {name: given[name] == 'true'} if given[name] else {}
 
 
 def number(given, argument, kind):
+    """The number in an argument, '' where it is empty."""
     try:
-        return kind(given[argument])
+        return given[argument] and kind(given[argument])
     except ValueError:
         raise ValueError(f"{argument}: '{given[argument]}' is no number") from None

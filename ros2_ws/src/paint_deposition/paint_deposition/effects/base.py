@@ -1,9 +1,8 @@
 """The base of effects: one physical cause, its parameters, and where in the model it acts."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -75,11 +74,6 @@ def parameter(
     )  # fmt: skip
 
 
-def read_only(**covariates: Any) -> Mapping[str, Any]:
-    """A read-only mapping, as for ``Effect.covariates``."""
-    return MappingProxyType(covariates)
-
-
 class Effect(BaseModel):
     """Base of all effects: subclass it, name it, and define one of the places where it acts.
 
@@ -107,9 +101,8 @@ class Effect(BaseModel):
     signature: ClassVar[str] = ''
     rivals: ClassVar[tuple[str, ...]] = ()
     source: ClassVar[str] = ''
-    # Covariates along which the law may be off, each with the way in which the film goes with it:
-    # it rises (1), falls (-1), or either (0).
-    covariates: ClassVar[Mapping[str, int]] = read_only()
+    # Covariates over which the law may be off in a way of its own.
+    covariates: ClassVar[tuple[str, ...]] = ()
     # What a law of any form over them would be: a 'factor' on what arrives or an 'addition' to the
     # film; '' where a curve over a covariate is not that effect.
     free_law: ClassVar[str] = ''

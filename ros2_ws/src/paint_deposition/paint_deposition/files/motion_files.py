@@ -268,7 +268,8 @@ def _by_transforms(
     if part_pose is not None and others:
         tree.place(part, others.most_common(1)[0][0], part_pose)
     between = tree.moving_between(named, part)
-    target = part if own or between is not None else named
+    placed = any(tree.moving_between(frame, part) is not None for frame in others)
+    target = part if own or placed else named
     taken = np.isin(frames, [*own, target])
     positions, quaternions = recorded.positions_m.copy(), recorded.quaternions_xyzw.copy()
     for frame in sorted(others.keys() - {target}):

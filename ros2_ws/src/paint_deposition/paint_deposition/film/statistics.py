@@ -65,10 +65,8 @@ class FilmStatistics:
     @property
     def band_um(self) -> tuple[float, float]:
         """Lowest and highest film of the target band [um]."""
-        return (
-            self.target_um - self.target_tolerance_um,
-            self.target_um + self.target_tolerance_um,
-        )
+        off = self.target_tolerance_um
+        return self.target_um - off, self.target_um + off
 
     def to_dict(self) -> dict[str, Any]:
         """All figures by name; None stands for NaN, which JSON does not know."""

@@ -120,9 +120,8 @@ class RepeatedSamples:
     def are_new(self, stamps_ns: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Whether the samples, (N,) int64 and (N, K), are no repeats: (N,) of bool."""
         new = np.ones(len(values), dtype=bool)
-        for row, (stamp_ns, value) in enumerate(
-            zip(stamps_ns.tolist(), values.tolist(), strict=True)
-        ):
+        samples = zip(stamps_ns.tolist(), values.tolist(), strict=True)
+        for row, (stamp_ns, value) in enumerate(samples):
             if value != self._last:
                 stood = self._last_ns - self._since_ns > LONGEST_REPEAT_NS
                 self._seen += 0 if stood else self._waiting

@@ -12,10 +12,8 @@ from pathlib import Path
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 # Fast DDS reads its settings from the file that is named here; in Jazzy under its former name.
-FAST_DDS_FILES = 'FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE'
-if not any(name in os.environ for name in FAST_DDS_FILES):
-    announced_often = str(Path(__file__).with_name('runtime') / 'fastdds.xml')
-    os.environ[FAST_DDS_FILES[os.environ.get('ROS_DISTRO') == 'jazzy']] = announced_often
+for name in ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE'):
+    os.environ.setdefault(name, str(Path(__file__).with_name('runtime') / 'fastdds.xml'))
 
 
 def _run(name: str, place: str, node_class: str) -> int:

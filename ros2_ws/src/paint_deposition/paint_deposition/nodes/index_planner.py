@@ -80,7 +80,7 @@ class IndexPlanner(PaintNode):
         self._last = Status(OK, 'no request yet')
         self.create_service(RecommendIndex, 'recommend_index', self._recommend)
         self._planning = ThreadPoolExecutor(max_workers=1, thread_name_prefix='plan_passes')
-        self._closed = False
+        self._closed, self._goals = False, list[ServerGoalHandle]()
         self._action = ActionServer(
             self, PlanPasses, 'plan_passes', self._execute,
             callback_group=ReentrantCallbackGroup(),
@@ -95,9 +95,11 @@ class IndexPlanner(PaintNode):
             self._plan({})
 
     def close(self) -> None:
-        """Cancel the goal that is under way, and destroy the action server."""
+        """Abort the goals that are under way, and destroy the action server."""
         self._closed = True
         self._planning.shutdown(cancel_futures=True)
+        for goal in self._goals:
+            goal.abort()
         self._action.destroy()
 
     def _selected_model(self) -> DepositionModel:
@@ -188,6 +190,7 @@ class IndexPlanner(PaintNode):
                 given.setdefault('speed_m_per_s', 0.0)
             return self._plan(given, progress)
 
+        self._goals.append(goal)
         try:
             planned, path = await self.result_of(self._planning.submit(work))
         except CancelledError:
@@ -196,6 +199,8 @@ class IndexPlanner(PaintNode):
         except (PaintError, MemoryError) as error:
             goal.abort()
             return PlanPasses.Result(message=str(error) or 'not enough memory')
+        finally:
+            self._goals.remove(goal)
         goal.succeed()
         return PlanPasses.Result(
             success=True,

@@ -129,7 +129,7 @@ class ModelComparison(PaintingNode):
 
     @property
     def _model_name(self) -> str:
-        files = self.values['model_files'] or [self.values['model_file']]
+        files = dict.fromkeys(self.files_in_use)
         return ' '.join(Path(file).name or 'default model' for file in files)
 
     def publish(self) -> None:

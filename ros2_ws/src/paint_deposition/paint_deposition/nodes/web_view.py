@@ -55,13 +55,11 @@ class WebView(PaintNode):
             atomizers=atomizers_parameter('to show'),
             host=NodeParameter(
                 DEFAULT_HOST,
-                'Address to listen on; any but that of this machine alone needs a token [name]',
+                'Address to listen on; any but that of this machine alone needs a token, that of '
+                f'{TOKEN} in the environment, or one that is made [name]',
             ),
             port=NodeParameter(
                 DEFAULT_PORT, 'Port to listen on; 0: one that is free [-]', (0, 65535)
-            ),
-            token=NodeParameter(
-                '', f'Token that browsers must give; empty: that of {TOKEN}, or made [name]'
             ),
         )
     )
@@ -111,7 +109,7 @@ class WebView(PaintNode):
         self._sent = 0, time.monotonic()
         self._show_part(self.values['mesh_file'])
         values = self.values
-        token = values['token'] or os.environ.get(TOKEN, '')
+        token = os.environ.get(TOKEN, '')
         self.page = Page(self.scene, values['host'], values['port'], token)
         # Not to the log, which is published.
         sys.stdout.write(f'the page is at {self.page.url}\n')

@@ -214,14 +214,10 @@ class CurvedEdges:
         along = (vertices_m[end] - vertices_m[start]) / lengths[:, None]
         normal = _unit(normals[start] + normals[end])
         middle = 0.5 * (vertices_m[start] + vertices_m[end])
-        return CurvedEdges(
-            middle,
-            normal,
-            middle + sagitta[:, None] * normal,
-            _unit(normal - 1.5 * lean[:, None] * along),
-            lengths,
-            np.arccos(np.clip(np.einsum('ij,ij->i', normals[start], normals[end]), -1.0, 1.0)),
-        )
+        curved, turned = middle + sagitta[:, None] * normal, normal - 1.5 * lean[:, None] * along
+        cosine = np.einsum('ij,ij->i', normals[start], normals[end])
+        turns = np.arccos(np.clip(cosine, -1.0, 1.0))
+        return CurvedEdges(middle, normal, curved, _unit(turned), lengths, turns)
 
 
 def _bends(

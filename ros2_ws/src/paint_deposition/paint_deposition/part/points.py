@@ -124,16 +124,11 @@ class SurfacePoints:
             if name != 'slope_per_m'
         }
         return SurfacePoints(
-            self.positions_m[rows],
-            self.normals[rows],
-            down=self.down,
-            outward=self.outward,
-            centre_m=self.centre_m,
-            extent_m=self.extent_m,
+            self.positions_m[rows], self.normals[rows], down=self.down, outward=self.outward,
+            centre_m=self.centre_m, extent_m=self.extent_m,
             area_m2=None if self.area_m2 is None else self.area_m2[rows],
-            slope_per_m=lambda: _slope_among(self.slope_per_m, rows),
-            **kept,
-        )
+            slope_per_m=lambda: _slope_among(self.slope_per_m, rows), **kept,
+        )  # fmt: skip
 
     def _covariate(self, name: str) -> Any:
         value = self._covariates[name]

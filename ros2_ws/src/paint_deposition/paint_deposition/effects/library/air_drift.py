@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter
 
 
 class AirDrift(Effect):
@@ -18,7 +18,7 @@ class AirDrift(Effect):
     id = 'air_drift'
     family = 'lateral shift'
     needs = 'draught'
-    covariates = read_only(height_fraction=0, standoff_ratio=0)
+    covariates = ('height_fraction', 'standoff_ratio')
     signature = 'pattern shifted in a direction fixed in the booth, however the gun is turned'
     rivals = ('tcp_offset', 'tcp_tilt', 'part_misalignment', 'sag')
     source = (

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter, read_only
+from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -16,7 +16,7 @@ class ConvexAttraction(Effect):
     id = 'convex_attraction'
     family = 'curvature'
     needs = 'voltage'
-    covariates = read_only(curvature_per_m=-1)
+    covariates = ('curvature_per_m',)
     free_law = 'factor'
     signature = 'a ridge along convex lines, whichever way the passes run'
     rivals = ('gauge_curvature_bias',)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter
 
 # A gun that is slower than this stands, and its log trembles [m/s].
 STANDING_M_PER_S = 0.003
@@ -18,7 +18,7 @@ class CornerSlowdown(Effect):
 
     id = 'corner_slowdown'
     family = 'boundary'
-    covariates = read_only(stroke_end_m=-1)
+    covariates = ('stroke_end_m',)
     free_law = 'factor'
     signature = 'more paint where the passes turn, none along edges that they run beside'
     rivals = ('edge_build', 'trigger_lag', 'standoff_efficiency')

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, SurfacePoints, parameter, read_only
+from paint_deposition.effects.base import Effect, SurfacePoints, parameter
 
 
 class EdgeBuild(Effect):
@@ -15,7 +15,7 @@ class EdgeBuild(Effect):
     id = 'edge_build'
     family = 'boundary'
     needs = 'voltage'
-    covariates = read_only(edge_distance_m=-1)
+    covariates = ('edge_distance_m',)
     free_law = 'factor'
     signature = 'a rim of more paint along all free edges alike'
     rivals = ('corner_slowdown',)

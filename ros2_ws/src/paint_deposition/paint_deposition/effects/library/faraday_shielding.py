@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter, read_only
+from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -17,7 +17,7 @@ class FaradayShielding(Effect):
     id = 'faraday_shielding'
     family = 'curvature'
     needs = 'voltage'
-    covariates = read_only(curvature_per_m=-1, sky_view_factor=1)
+    covariates = ('curvature_per_m', 'sky_view_factor')
     free_law = 'factor'
     signature = 'concave zones low, whichever way the passes run'
     rivals = ('gauge_curvature_bias', 'occlusion')

@@ -1,6 +1,6 @@
 """Flow that drifts from pass to pass."""
 
-from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter
 
 # The calibrated flow is that of the middle of a job; live nobody knows how many passes will come.
 MIDDLE_PASS = 2.5
@@ -15,7 +15,7 @@ class FlowDrift(Effect):
 
     id = 'flow_drift'
     family = 'order'
-    covariates = read_only(time_s=0, spray_pass=0)
+    covariates = ('time_s', 'spray_pass')
     free_law = 'factor'
     signature = 'level changes in the order of the passes; reversed if their order is'
     rivals = ('fog_gradient',)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, SurfacePoints, parameter, read_only
+from paint_deposition.effects.base import Effect, SurfacePoints, parameter
 
 
 class FogGradient(Effect):
@@ -14,7 +14,7 @@ class FogGradient(Effect):
 
     id = 'fog_gradient'
     family = 'order'
-    covariates = read_only(height_fraction=-1)
+    covariates = ('height_fraction',)
     free_law = 'addition'
     signature = 'more at the bottom, by a fixed amount: not in proportion to the film'
     rivals = ('flow_drift',)

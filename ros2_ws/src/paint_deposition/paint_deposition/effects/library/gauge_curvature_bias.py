@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter, read_only
+from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -16,7 +16,7 @@ class GaugeCurvatureBias(Effect):
 
     id = 'gauge_curvature_bias'
     family = 'curvature'
-    covariates = read_only(curvature_per_m=-1)
+    covariates = ('curvature_per_m',)
     free_law = 'addition'
     signature = 'follows curvature, not film: the same on thin and on thick paint'
     rivals = ('faraday_shielding', 'convex_attraction')

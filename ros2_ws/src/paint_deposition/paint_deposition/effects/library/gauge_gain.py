@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, SurfacePoints, parameter, read_only
+from paint_deposition.effects.base import Effect, SurfacePoints, parameter
 
 
 class GaugeGain(Effect):
@@ -15,7 +15,7 @@ class GaugeGain(Effect):
     id = 'gauge_gain'
     family = 'level'
     exact = True
-    covariates = read_only(film_um=0)
+    covariates = ('film_um',)
     signature = 'in proportion to the film everywhere; the same as another K1'
     rivals = ('gauge_zero',)
     source = 'specification of gauges: a fixed amount plus a percentage, 1 to 3 %'

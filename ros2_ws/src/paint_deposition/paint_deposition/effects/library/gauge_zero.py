@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, SurfacePoints, parameter, read_only
+from paint_deposition.effects.base import Effect, SurfacePoints, parameter
 
 
 class GaugeZero(Effect):
@@ -14,7 +14,7 @@ class GaugeZero(Effect):
     id = 'gauge_zero'
     family = 'level'
     exact = True
-    covariates = read_only(film_um=0)
+    covariates = ('film_um',)
     signature = 'the same amount on every reading; shows on bare metal'
     rivals = ('overspray_fog', 'gauge_gain')
     source = 'specification of gauges: 1 % or 2.5 um, whichever is greater (Elcometer)'

@@ -1,6 +1,6 @@
 """A plume that trails behind the moving gun."""
 
-from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter
 
 
 class GunWake(Effect):
@@ -12,7 +12,7 @@ class GunWake(Effect):
 
     id = 'gun_wake'
     family = 'time'
-    covariates = read_only(speed_m_per_s=0)
+    covariates = ('speed_m_per_s',)
     signature = 'passes moved against their direction, in proportion to the speed'
     rivals = ('pose_lag', 'trigger_lag')
     source = 'time of flight of 5 to 50 ms; size from general practice'

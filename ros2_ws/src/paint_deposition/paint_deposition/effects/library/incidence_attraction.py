@@ -1,6 +1,6 @@
 """Attraction to surface that turns away from the gun, or rebound from it."""
 
-from paint_deposition.effects.base import Effect, Ray, parameter, read_only
+from paint_deposition.effects.base import Effect, Ray, parameter
 
 
 class IncidenceAttraction(Effect):
@@ -15,7 +15,7 @@ class IncidenceAttraction(Effect):
 
     id = 'incidence_attraction'
     family = 'incidence'
-    covariates = read_only(incidence_deg=0)
+    covariates = ('incidence_deg',)
     free_law = 'factor'
     signature = 'grows with incidence; most on surface that turns away from the gun'
     rivals = ('standoff_efficiency',)

@@ -1,6 +1,6 @@
 """Metal that stands between the gun and the surface."""
 
-from paint_deposition.effects.base import Effect, parameter, read_only
+from paint_deposition.effects.base import Effect, parameter
 
 
 class Occlusion(Effect):
@@ -12,7 +12,7 @@ class Occlusion(Effect):
 
     id = 'occlusion'
     family = 'visibility'
-    covariates = read_only(sky_view_factor=0)
+    covariates = ('sky_view_factor',)
     signature = 'less behind other parts of the surface, with a step at the edge of the shadow'
     rivals = ('faraday_shielding',)
     source = 'rays against the mesh (Moeller and Trumbore), as in simulators of cold spray'

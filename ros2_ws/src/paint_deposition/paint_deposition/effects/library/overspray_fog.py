@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, SurfacePoints, parameter, read_only
+from paint_deposition.effects.base import Effect, SurfacePoints, parameter
 
 
 class OversprayFog(Effect):
@@ -14,7 +14,7 @@ class OversprayFog(Effect):
 
     id = 'overspray_fog'
     family = 'level'
-    covariates = read_only(sky_view_factor=0)
+    covariates = ('sky_view_factor',)
     signature = 'the same amount everywhere; shows where the model says none'
     rivals = ('gauge_zero', 'pattern_spread')
     source = 'transfer efficiency of 0.8 leaves 20 % airborne; measured far tails of sprayers'

@@ -2,7 +2,7 @@
 
 import scipy
 
-from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter
 
 
 class PartMisalignment(Effect):
@@ -18,7 +18,7 @@ class PartMisalignment(Effect):
     id = 'part_misalignment'
     family = 'lateral shift'
     exact = True
-    covariates = read_only(height_fraction=0)
+    covariates = ('height_fraction',)
     signature = 'pattern shifted in a direction fixed in the part, more so away from its centre'
     rivals = ('air_drift', 'tcp_offset', 'tcp_tilt', 'sag', 'tcp_standoff')
     source = 'error of fixtures; size from general practice'

@@ -1,6 +1,6 @@
 """A pattern that does not widen in proportion to the distance."""
 
-from paint_deposition.effects.base import Effect, Ray, parameter, read_only
+from paint_deposition.effects.base import Effect, Ray, parameter
 from paint_deposition.kernel.fast_math import power
 
 # Standoffs between a quarter of the model plane's distance and four times it are within reach.
@@ -18,7 +18,7 @@ class PatternSpread(Effect):
 
     id = 'pattern_spread'
     family = 'standoff'
-    covariates = read_only(standoff_ratio=0)
+    covariates = ('standoff_ratio',)
     signature = 'the width of the pattern changes with the distance, not what it deposits'
     rivals = ('tcp_standoff', 'overspray_fog')
     source = (

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, SurfacePoints, parameter, read_only
+from paint_deposition.effects.base import Effect, SurfacePoints, parameter
 
 REFERENCE_FILM_UM = 20.0
 
@@ -19,7 +19,7 @@ class Sag(Effect):
 
     id = 'sag'
     family = 'lateral shift'
-    covariates = read_only(film_um=0, height_fraction=0)
+    covariates = ('film_um', 'height_fraction')
     signature = "thick zones thinner at their top and thicker below; grows with the film's cube"
     rivals = ('air_drift', 'tcp_offset', 'tcp_tilt', 'part_misalignment')
     source = (

@@ -1,6 +1,6 @@
 """Transfer efficiency that falls with the distance from the bell."""
 
-from paint_deposition.effects.base import Effect, Ray, parameter, read_only
+from paint_deposition.effects.base import Effect, Ray, parameter
 from paint_deposition.kernel.fast_math import power
 
 
@@ -13,7 +13,7 @@ class StandoffEfficiency(Effect):
 
     id = 'standoff_efficiency'
     family = 'standoff'
-    covariates = read_only(standoff_ratio=-1)
+    covariates = ('standoff_ratio',)
     free_law = 'factor'
     signature = 'negative where the gun is far, positive where it is near; level, not width'
     rivals = ('incidence_attraction', 'corner_slowdown', 'tcp_standoff')

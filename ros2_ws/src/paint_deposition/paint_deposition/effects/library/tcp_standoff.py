@@ -1,6 +1,6 @@
 """A TCP calibrated too short or too long along the bell's axis."""
 
-from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter
 
 
 class TcpStandoff(Effect):
@@ -13,7 +13,7 @@ class TcpStandoff(Effect):
     id = 'tcp_standoff'
     family = 'standoff'
     exact = True
-    covariates = read_only(standoff_ratio=0)
+    covariates = ('standoff_ratio',)
     signature = 'as if the whole path were sprayed from another distance'
     rivals = ('pattern_spread', 'standoff_efficiency')
     source = 'error of tool calibration; size from general practice'

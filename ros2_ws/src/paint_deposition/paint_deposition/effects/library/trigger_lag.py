@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter, read_only
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter
 
 
 class TriggerLag(Effect):
@@ -17,7 +17,7 @@ class TriggerLag(Effect):
 
     id = 'trigger_lag'
     family = 'boundary'
-    covariates = read_only(since_trigger_s=0)
+    covariates = ('since_trigger_s',)
     signature = 'less paint where the gun opens and more where it closes, on alternate sides'
     rivals = ('corner_slowdown', 'pose_lag')
     source = (

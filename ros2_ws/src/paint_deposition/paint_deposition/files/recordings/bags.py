@@ -218,7 +218,7 @@ def _changes_of_states(
         changes.append((change.stamp_ns, change.flow, change.brush, log_time_ns))
         for name in SETTINGS if change.flow > 0.0 else ():
             value = getattr(message, name, np.nan)
-            if np.isfinite(value):
+            if np.isfinite(value) and value != 0.0:  # 0 is what is not filled
                 settings.setdefault(name, []).append(value)
     if refused:
         bag.skipped[f'states on {topic.name}, the first of them an {refused[0]}'] = len(refused)

@@ -45,7 +45,12 @@ from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed, requested
-from paint_deposition.nodes.runtime.topics import header, header_stamp_ns, pose_message
+from paint_deposition.nodes.runtime.topics import (
+    header,
+    header_stamp_ns,
+    pose_message,
+    unknown_state,
+)
 from paint_deposition.request import MotionOptions
 
 
@@ -210,15 +215,11 @@ class BagPlayer(PaintNode):
     # --- the replay's own thread
 
     def _replay(self) -> None:
-        try:
-            while not self.stopped.is_set():
-                self._play_once()
-                self._flow_control.wait_until_taken()
-                if not self.values['loop']:
-                    break
-        except Exception as error:
-            self.fail(error)
-            return
+        while not self.stopped.is_set():
+            self._play_once()
+            self._flow_control.wait_until_taken()
+            if not self.values['loop']:
+                break
         self.finish()
 
     def _play_once(self) -> None:
@@ -293,11 +294,9 @@ def state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage],
     own_hash = definitions.installed(STATE_TYPE).type_hash
     if states is not None and not is_bool and bag.type_hash(states) == own_hash:
         return lambda message: message.cdr
-    kinds = AtomizerState.get_fields_and_field_types()
-    doubles = [name for name, kind in kinds.items() if kind == 'double']
 
     def as_state(message: RawMessage) -> bytes:
-        state = AtomizerState(**dict.fromkeys(doubles, math.nan))  # unknown
+        state = unknown_state()
         if is_bool:
             state.header = header('', message.log_time_ns)
             state.spraying = deserialize_message(message.cdr, Bool).data
@@ -307,8 +306,9 @@ def state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage],
             state.header = header(recorded.header.frame_id, stamp_ns(recorded.header))
             state.spraying = bool(recorded.spraying)
             state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
-            for name in doubles:
-                setattr(state, name, float(getattr(recorded, name, math.nan)))
+            for name, kind in state.get_fields_and_field_types().items():
+                if kind == 'double':
+                    setattr(state, name, float(getattr(recorded, name, math.nan)))
         return serialize_message(state)
 
     return as_state

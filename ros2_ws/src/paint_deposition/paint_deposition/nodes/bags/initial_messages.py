@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from geometry_msgs.msg import TransformStamped
 from paint_msgs.msg import AtomizerState, Part
@@ -12,7 +12,12 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings.messages import stamp_ns, trigger_change
+from paint_deposition.files.recordings.messages import (
+    TF_TYPES,
+    own_types,
+    stamp_ns,
+    trigger_change,
+)
 from paint_deposition.motion.part_frame import Rigid, is_pose
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.nodes.bags.recorded_topic import PARAMETER_EVENTS, STATIC_TF
@@ -74,7 +79,9 @@ class InitialMessages:
             changed = (*event.new_parameters, *event.changed_parameters)
             self._replace((event.node, *(parameter.name for parameter in changed)), message)
         elif topic == STATIC_TF:
-            self._replace(cdr, message)
+            placed: Any = own_types().deserialize_cdr(cdr, TF_TYPES[0])
+            children = frozenset(each.child_frame_id for each in placed.transforms)
+            self._replace((STATIC_TF, children), message)
 
     def begin_part(self, part: Part, sent_ns: int) -> tuple[dict[str, int], dict[str, int]]:
         """Forget what only the parts before needed.

@@ -15,6 +15,8 @@ from rosbags.interfaces import (
 )
 
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic
+from paint_deposition.files.recordings.messages import JOINT_TYPE, STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.parameters import (
     CONFIGURED,
@@ -26,6 +28,7 @@ from paint_deposition.nodes.runtime.parameters import (
 )
 from paint_deposition.nodes.runtime.topics import (
     MOST_PUBLISHERS,
+    TRUST_TOPIC,
     AdaptiveSubscription,
     gun_topic,
     header_stamp_ns,
@@ -33,6 +36,8 @@ from paint_deposition.nodes.runtime.topics import (
 )
 
 POSES, STATES = 'atomizer/pose', 'atomizer/state'
+# A message of these that is lost is lost motion, or paint.
+MOTION_TYPES = {POSE_TYPE, STATE_TYPE, JOINT_TYPE, *TF_TYPES}
 STATIC_TF, PART_POSE, PARAMETER_EVENTS = '/tf_static', 'part_pose', '/parameter_events'
 
 RECORDER = dict(
@@ -79,7 +84,7 @@ def default_topics(guns: Sequence[str]) -> list[str]:
     motion = [gun_topic(gun, topic) for gun in guns for topic in (POSES, STATES)]
     shares = [gun_topic(gun, 'thickness/field') for gun in guns if len(guns) > 1]
     return [
-        *motion, *shares, 'thickness/cloud', 'thickness/field', 'thickness/stats',
+        *motion, *shares, 'thickness/cloud', 'thickness/field', 'thickness/stats', TRUST_TOPIC,
         'comparison/stats', 'planned_path', PART_POSE, '/tf', STATIC_TF, '/diagnostics',
         PARAMETER_EVENTS,
     ]  # fmt: skip
@@ -98,6 +103,7 @@ class RecordedTopic(AdaptiveSubscription):
         unnumbered: messages without a sequence number, whose losses cannot be counted.
         gaps, longest_gap_ns: intervals between header stamps above the limit.
         newest_stamp_ns: header stamp of the last message.
+        sent_ns: when the last message was sent.
     """
 
     def __init__(
@@ -110,7 +116,7 @@ class RecordedTopic(AdaptiveSubscription):
         depth: int,
     ) -> None:
         self.run_topic, self.name = run_topic, run_topic.name
-        self.messages = self.lost = self._log_time_ns = 0
+        self.messages = self.lost = self._log_time_ns = self.sent_ns = 0
         # How each publisher was first heard: number of the message, when it was sent, and how
         # long after the begin of the run; and how many came before, by its rate.
         self._first: dict[bytes, tuple[int, int, int]] = {}
@@ -168,7 +174,8 @@ class RecordedTopic(AdaptiveSubscription):
                 self.longest_gap_ns = max(self.longest_gap_ns, gap_ns)
         # Log times order the messages; times of receipt may go back a little under load.
         self._log_time_ns = max(self._log_time_ns, info['received_timestamp'])
-        self._pass_on(self.name, cdr, self._log_time_ns, info['source_timestamp'])
+        self.sent_ns = info['source_timestamp']
+        self._pass_on(self.name, cdr, self._log_time_ns, self.sent_ns)
 
     def _count_before_first(self, publisher: bytes, number: int, info: Mapping[str, Any]) -> None:
         """Count what a publisher sent in the run before it was heard, by how often it sends."""

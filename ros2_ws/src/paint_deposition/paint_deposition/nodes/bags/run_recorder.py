@@ -20,6 +20,7 @@ from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.bags.initial_messages import TF, InitialMessages
 from paint_deposition.nodes.bags.recorded_topic import (
     MISSED_BEFORE_DISCOVERY,
+    MOTION_TYPES,
     PARAMETER_EVENTS,
     PART_POSE,
     POSES,
@@ -40,8 +41,9 @@ from paint_deposition.nodes.runtime.topics import (
     header,
 )
 
-# The run of a part that has left takes poses that were sent for it until none has come so long.
-LATE_S = 2.0
+# The run of a part that has left takes what was sent for it until it has all, or none has come so
+# long: a message that got lost comes with the third next heartbeat of its writer at the latest.
+LATE_S = 10.0
 
 
 class RunRecorder(ManagedNode):
@@ -58,28 +60,22 @@ class RunRecorder(ManagedNode):
     runs = 0
 
     def _configure(self) -> Mapping[str, Task]:
-        guns = self.values['atomizers'] or ['']
-        wanted = self.values['topics'] or default_topics(guns)
-        self._part_topic = self.resolve_topic_name(PART_TOPIC)
-        named = [self.resolve_topic_name(name) for name in wanted]
-        self._wanted = list(dict.fromkeys([*named, self._part_topic]))
+        guns, resolved = self.values['atomizers'] or [''], self.resolve_topic_name
+        self._part_topic = resolved(PART_TOPIC)
+        wanted = map(resolved, self.values['topics'] or default_topics(guns))
+        self._wanted = list(dict.fromkeys([*wanted, self._part_topic]))
         motion = {
-            gun: (
-                self.resolve_topic_name(gun_topic(gun, POSES)),
-                self.resolve_topic_name(gun_topic(gun, STATES)),
-            )
+            gun: (resolved(gun_topic(gun, POSES)), resolved(gun_topic(gun, STATES)))
             for gun in guns
         }
-        self._initial_messages = InitialMessages(motion, self.resolve_topic_name(PART_POSE))
+        self._initial_messages = InitialMessages(motion, resolved(PART_POSE))
         # Also while no run is recorded, since they stay in force.
         self._always_heard = {PARAMETER_EVENTS, *(states for _, states in motion.values())}
         self.recorded: dict[str, RecordedTopic] = {}
         self._error: RecordingError | None = None
         self._progress = {
-            self.resolve_topic_name(gun_topic(gun, POSES)): self.create_publisher(
-                PoseProgress, gun_topic(gun, PROGRESS_TOPIC), PROGRESS
-            )
-            for gun in guns
+            poses: self.create_publisher(PoseProgress, gun_topic(gun, PROGRESS_TOPIC), PROGRESS)
+            for gun, (poses, _) in motion.items()
         }
         self.create_trigger_service('~/stop', self._stop)
         return {'recording': self.status}
@@ -119,9 +115,7 @@ class RunRecorder(ManagedNode):
         run = folder / name
         if run.exists() and not keep_name:
             dated = name + time.strftime('_%Y%m%d_%H%M%S')
-            names = itertools.chain(
-                [dated], (f'{dated}_{number}' for number in itertools.count(2))
-            )
+            names = itertools.chain([dated], (f'{dated}_{n}' for n in itertools.count(2)))
             run = next(folder / each for each in names if not (folder / each).exists())
         return RunWriter(run, custom_data, compression=self.values['compression'])
 
@@ -134,9 +128,9 @@ class RunRecorder(ManagedNode):
     # --- discovery
 
     def _discover(self) -> None:
-        if self.leaving is not None and time.monotonic() > self._leaves_s:
+        if self.leaving is not None and self._has_left(self.leaving):
             self._drain()  # what is in the queues may be of that part
-            if time.monotonic() > self._leaves_s:
+            if self._has_left(self.leaving):
                 self._guarded(self._end_of_leaving)
         for name in self._wanted:
             publishers = self.get_publishers_info_by_topic(name)
@@ -156,7 +150,7 @@ class RunRecorder(ManagedNode):
                 self._guarded(self.run.add_topic, run_topic)
                 self.recorded[name] = RecordedTopic(
                     self, run_topic, self._write, max_gap_ns, self._begun_ns,
-                    depth=5000 if is_pose or name == TF else 100,
+                    depth=5000 if types[0] in MOTION_TYPES else 100,
                 )  # fmt: skip
             except RecordingError as error:
                 self._refused.add(name)
@@ -193,6 +187,14 @@ class RunRecorder(ManagedNode):
         self.leaving.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
         self.leaving.keep_another(name)
         self._leaves_s = time.monotonic() + LATE_S
+
+    def _has_left(self, leaving: RunWriter) -> bool:
+        """Whether a run has the last messages of its part, which come in order, or waits no more.
+
+        Later transforms may still tell where the part was.
+        """
+        misses = any(t.sent_ns < self._left_ns.get(name, 0) for name, t in self.recorded.items())
+        return not (misses or TF in leaving.counts) or time.monotonic() > self._leaves_s
 
     def _drain(self) -> None:
         """Take what is in the queues of all topics but that of the part."""
@@ -263,12 +265,9 @@ class RunRecorder(ManagedNode):
 
     def _report_progress(self) -> None:
         for name in self._progress.keys() & self.recorded.keys():
-            topic = self.recorded[name]
-            report = PoseProgress(
-                header=header('', topic.newest_stamp_ns),
-                reporter=self.get_fully_qualified_name(),
-                poses_received=topic.messages,
-            )
+            report = PoseProgress(reporter=self.get_fully_qualified_name())
+            report.header = header('', self.recorded[name].newest_stamp_ns)
+            report.poses_received = self.recorded[name].messages
             self._progress[name].publish(report)
 
     # --- ending

@@ -78,9 +78,9 @@ class DepositionSimulator(PaintingNode):
         return painting_tasks(self, self.display.diagnostic_values) | {'part': self.parts.status}
 
     def _cleanup(self) -> None:
-        super()._cleanup()
         self.parts.close()
         self._saving.shutdown()
+        super()._cleanup()
 
     def _load_files(self) -> None:
         self._mesh_version = mesh_version(self.values['mesh_file'])
@@ -92,12 +92,13 @@ class DepositionSimulator(PaintingNode):
 
     def reset(self) -> tuple[bool, str]:
         """Clear the film and all counts; a new run begins, if there were poses."""
+        if self.parts.waiting:
+            return False, 'the part is being changed: call again after it'
         self.catch_up()
-        had_poses = self.film.counts.received > 0
-        answer = super().reset()
-        if had_poses:
+        # First, since poses that come meanwhile are of the new run.
+        if self.film.counts.received:
             self.parts.begin_again()
-        return answer
+        return super().reset()
 
     def publish(self) -> None:
         """Publish the film if it has changed, or to new subscribers."""
@@ -135,13 +136,12 @@ class DepositionSimulator(PaintingNode):
         """
         film, surface, zones = self.film.snapshot(), self.surface, self.zones
         values, names, details = dict(self.values), self.gun_names, self._details()
-        counts = [gun.counts.to_dict() for gun in self.film.guns]
+        counts, files = [gun.counts.to_dict() for gun in self.film.guns], self.files_in_use
         if part:
             details['part'] = part
 
         def write() -> list[Path]:
             laid_cm3 = volume_by_gun(names, surface, film)
-            files = values['model_files'] or [values['model_file']] * len(names)
             details['atomizers'] = [
                 {
                     'name': name,
@@ -176,7 +176,7 @@ class DepositionSimulator(PaintingNode):
             'mesh_id': self.surface.mesh_id,
             'frame_id': self.frame.frame_id,
             'down': self.surface.down,
-            'model_file': self.values['model_file'],
+            'model_file': self.files_in_use[0] if len({*self.files_in_use}) == 1 else '',
             'zones_file': self.values['zones_file'],
             'effects': list(dict.fromkeys(effects)),
             'poses': self.film.counts.to_dict(),

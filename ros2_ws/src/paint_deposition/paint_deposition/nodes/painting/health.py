@@ -141,7 +141,7 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
     # Computing time over duration of the motion; above 1 the node falls behind.
     sums = [np.sum(source.times_s, axis=0) for source in node.inputs if source.times_s]
     factor = float(sum(spent_s / duration_s for spent_s, duration_s in sums))
-    files = node.values['model_files'] or [node.values['model_file'] or 'default']
+    files = dict.fromkeys(file or 'default' for file in node.files_in_use)
     effects = dict.fromkeys(effect.id for gun in guns for effect in gun.model.effects)
     values = {
         'mesh': node.mesh_file,
@@ -200,8 +200,8 @@ class FilmTrust:
                 if gun == source.name and name not in present:  # it has ended
                     del self._reports[gun, name]
                 elif gun == source.name and time.monotonic() - heard_s > 3.0:
-                    found.append(f'{name} has stalled')
-                elif gun == source.name and behind_s > 2.0:
+                    found.append(f'{name} has stalled, or is inactive')
+                elif gun == source.name and newest_ns and behind_s > 2.0:
                     found.append(f'{name} is {behind_s:.0f} s behind')
             doubts += [f'{source.name}: {doubt}' if source.name else doubt for doubt in found]
         if node.model_problem:

@@ -103,6 +103,7 @@ class PaintingNode(ManagedNode, ABC):
         zones: of its vertices, or None.
         points: the points that are painted.
         models: the model of each gun, by the parameters.
+        files_in_use: the file of the model with which each gun paints, '' for the default.
         film: the film so far, by one gun or several.
         inputs: the subscriptions, one for each gun.
         repainting: the repainting under way, if any.
@@ -142,8 +143,13 @@ class PaintingNode(ManagedNode, ABC):
         self.frame = PartFrame(self, self.values['frame_id'])
         self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
         self.models = models_from_parameters(self.values)
+        self._files = self.files_in_use = self._named_files()
         self.get_logger().info('getting ready; a new model is compiled first')
         self._take_part(self.prepare(self.mesh_file))
+
+    def _named_files(self) -> list[str]:
+        """The file of each gun's model, by the parameters."""
+        return self.values['model_files'] or [self.values['model_file']] * len(self.gun_names)
 
     # --- for the subclass
 
@@ -224,7 +230,7 @@ class PaintingNode(ManagedNode, ABC):
             new.reset_keeping_trigger_of(old)
         for source in self.inputs:
             source.reset_counts()
-        self.mesh_file = mesh_file
+        self.mesh_file, self.files_in_use = mesh_file, self._files
         self._take_part(replace(part, film=film))
         if self.repainting is not None:
             self._repaint()
@@ -263,7 +269,7 @@ class PaintingNode(ManagedNode, ABC):
             for gun in self.film.guns:
                 gun.trigger_latency_s = self.values['trigger_latency_s']
         if names & MODEL_PARAMETERS:
-            self.models = self._next_models
+            self.models, self._files = self._next_models, self._named_files()
             self._repaint(from_start=self.values['repaint'])
         if 'publish_rate_hz' in names:
             self.destroy_timer(self.show_timer)
@@ -348,8 +354,9 @@ class PaintingNode(ManagedNode, ABC):
             self.model_problem = f'the new model is not used: {error}'
             self.get_logger().error(self.model_problem)
             self.models = tuple(gun.model for gun in self.film.guns)
+            self._files = self.files_in_use
             return
         if film is None:
             self._repaint()
         else:
-            self.film = film
+            self.film, self.files_in_use = film, self._files

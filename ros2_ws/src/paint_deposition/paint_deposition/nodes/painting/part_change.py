@@ -85,13 +85,18 @@ class PartChange:
         node.create_service(ChangePart, '~/change_part', self._answer, callback_group=group)
 
     def close(self) -> None:
-        """Save the film if the part has a serial number, and those that could not be saved."""
-        self._reading.shutdown(cancel_futures=True)
-        if self.part.serial and self._node.film.counts.received:
-            self._unsaved.append(self._film_writer())
+        """Save the film if the part has a serial number, and those that could not be saved.
+
+        Raises:
+            PaintError: one cannot be saved; the part stays.
+        """
+        own = [self._film_writer()] if self.part.serial and self._node.film.counts.received else []
+        self._unsaved += own
         self._saving.submit(self._save_films).result()
         if self._save_error:
+            del self._unsaved[len(self._unsaved) - len(own) :]  # it may be painted on
             raise PaintError(self._save_error)
+        self._reading.shutdown(cancel_futures=True)
 
     def status(self) -> Status:
         """The status of the part and of its last change, and whether paint lands on it."""

@@ -28,6 +28,7 @@ from paint_deposition.nodes.runtime.topics import (
     header,
     message_class,
     pose_message,
+    unknown_state,
 )
 from paint_deposition.request import MotionOptions
 
@@ -69,7 +70,7 @@ class AtomizerSource(PaintNode):
         joint_prefix=requested(MotionOptions, 'joint_prefix', ''),
         angle_unit=NodeParameter(
             '',
-            'Unit of joints that turn; empty: rad, unless they turn too far [name]',
+            'Unit of joints that turn; empty: rad, and one beyond its limits is refused [name]',
             choices=('', 'rad', 'deg'),
         ),
         tcp_offset=NodeParameter(
@@ -111,7 +112,7 @@ class AtomizerSource(PaintNode):
             signal.topic: self._on_signal_message for signal in self._signals.values()
         }
         self._values: dict[str, float] = {}
-        self._published = ''
+        self._published, self._newest_ns = '', 0
         self.poses_published = 0
         # Of the robot's poses: their frame, when the last came, and how late they are sent.
         self._base, self._pose_s, self._clock_offset_s = '', time.monotonic(), 0.0
@@ -131,6 +132,8 @@ class AtomizerSource(PaintNode):
             self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
         self._problems: dict[str, str] = {}  # by topic
         self._heard: list[AdaptiveSubscription] = []
+        if isinstance(self._motion, TfPoses):
+            self._heard += self._motion.topics
         self.create_steady_timer(0.1, self._discover_topics)
         self.report({'robot': self._robot_status, 'signals': self._signals_status})
 
@@ -222,21 +225,25 @@ class AtomizerSource(PaintNode):
             else:
                 self._values[name] = value
         self._problems[topic] = problem
+        at_ns = stamp or info['source_timestamp'] or self.get_clock().now().nanoseconds
+        # Signals overtake each other, and a state is as new as the newest; unless a clock was set
+        # back.
+        if at_ns >= self._newest_ns - 1e9 * MAX_CLOCK_OFFSET_S:
+            at_ns = max(at_ns, self._newest_ns)
+        self._newest_ns = at_ns
         # All signals must be known.
         if problem or self._signals.keys() - self._values.keys():
             return
         full = self.values['calibrated_flow']
         speed = self._values.get('speed', math.nan) * self.values['speed_scale']
-        state = AtomizerState(
-            spraying=bool(self._signals['trigger'].is_on(self._values['trigger'])),
-            flow=self._values.get('flow', full) / full,
-            brush=int(self._values.get('brush', ONLY_BRUSH)),
-            programmed_speed_m_per_s=speed,
-        )
+        state = unknown_state()
+        state.spraying = bool(self._signals['trigger'].is_on(self._values['trigger']))
+        state.flow = self._values.get('flow', full) / full
+        state.brush = int(self._values.get('brush', ONLY_BRUSH))
+        state.programmed_speed_m_per_s = speed
         if str(state) != self._published:  # NaN does not equal itself
             self._published = str(state)
-            now_ns = info['source_timestamp'] or self.get_clock().now().nanoseconds
-            state.header = header(self._base, stamp or now_ns)
+            state.header = header(self._base, at_ns)
             self._state_publisher.publish(state)
 
     # --- diagnostics

@@ -1,6 +1,7 @@
 """Nodes `rws_source` and `opcua_source`: the gun's signals, of ABB or by OPC UA."""
 
 import asyncio
+import importlib
 import math
 import os
 import threading
@@ -60,6 +61,7 @@ class SignalSource(PaintNode):
     """
 
     PASSWORD: str  # the variable of the environment
+    LIBRARY: str
 
     def __init__(self, **kwargs: Any):
         super().__init__(**kwargs)
@@ -71,6 +73,7 @@ class SignalSource(PaintNode):
         self._newest_ns = 0
         # Of the connection, and of each signal.
         self._problem, self._problems = 'not connected yet', dict.fromkeys(self.signals, '')
+        self._logged: set[str] = set()
         # Signals of which nothing came since the connection was made.
         self._silent: set[str] = set()
         self._lock = threading.Lock()
@@ -89,6 +92,13 @@ class SignalSource(PaintNode):
         named = [values[kind] for kind in ('trigger', *FIELDS) if values[kind]]
         if len(set(named)) < len(named):
             raise PaintError(f'{self.get_name()}: a signal is named twice: {" ".join(named)}')
+        try:
+            importlib.import_module(self.LIBRARY)
+        except ImportError:
+            library = self.LIBRARY.partition('.')[0]
+            raise PaintError(
+                f'{self.get_name()}: {library} is not installed; run: pip install {library}'
+            ) from None
 
     def follow(self) -> None:
         """Connect and ``take`` the signals until ``stopped``; errors are told, then retried."""
@@ -112,16 +122,18 @@ class SignalSource(PaintNode):
             return
         with self._lock:
             self._problem = self._problems[signal] = ''
-            # The first value may have been there for long.
-            if own_ns is not None and signal not in self._silent:
-                lag_s = 1e-9 * (arrived_ns - own_ns)
+            lag_s = 0.0 if own_ns is None else 1e-9 * (arrived_ns - own_ns)
+            # The first value may have been there for long, and cannot be of the future.
+            if own_ns is not None and (signal not in self._silent or lag_s < -MAX_CLOCK_OFFSET_S):
                 self._lags_s.append(lag_s)
                 if abs(lag_s) > MAX_CLOCK_OFFSET_S:
-                    late = f'{signal} arrives {lag_s:.3g} s after its own time: set the clocks'
+                    late = f'{signal} arrives {lag_s:.0f} s after its own time: set the clocks'
                     self._problems[signal], at_ns = late, None
             self._silent.discard(signal)
             if at_ns is None:
                 at_ns = arrived_ns - round(1e9 * self.values['delay_s'])
+            if self._newest_ns > arrived_ns + 1e9 * MAX_CLOCK_OFFSET_S:  # this clock was set back
+                self._newest_ns = 0
             self._newest_ns = max(self._newest_ns, at_ns)
             self._received[kind] = value
             if {*self.signals.values()} - self._received.keys():
@@ -155,6 +167,9 @@ class SignalSource(PaintNode):
             'from the time of the server to arrival [ms]': lag,
             'delay taken out [ms]': f'{1e3 * self.values["delay_s"]:.1f}',
         }
+        for problem in {*problems} - self._logged:
+            self.get_logger().error(problem)
+        self._logged = {*problems}
         if problems:
             return Status(ERROR, '; '.join(problems), values)
         missing = [name for name, value in received.items() if value == 'not received']
@@ -178,14 +193,12 @@ class RwsSource(SignalSource):
         ),
         **SIGNALS,
     )
-    PASSWORD = 'RWS_PASSWORD'
+    PASSWORD, LIBRARY = 'RWS_PASSWORD', 'websockets.sync.client'
 
     def follow(self) -> None:
         """Subscribe to all signals in one group, and take its events."""
-        try:
-            from websockets.sync.client import connect
-        except ImportError:
-            raise PaintError('websockets is not installed; run: pip install websockets') from None
+        from websockets.sync.client import connect
+
         wanted: dict[str, Any] = {'resources': [*range(1, len(self.signals) + 1)]}
         for number, signal in enumerate(self.signals, start=1):
             # The highest of the three priorities that RWS has.
@@ -261,7 +274,7 @@ class OpcuaSource(SignalSource):
         ),
         **SIGNALS,
     )
-    PASSWORD = 'OPCUA_PASSWORD'
+    PASSWORD, LIBRARY = 'OPCUA_PASSWORD', 'asyncua.client.client'
 
     def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         super()._validate(values, changed)
@@ -277,10 +290,8 @@ class OpcuaSource(SignalSource):
         asyncio.run(self._follow())
 
     async def _follow(self) -> None:
-        try:
-            from asyncua.client.client import Client
-        except ImportError:
-            raise PaintError('asyncua is not installed; run: pip install asyncua') from None
+        from asyncua.client.client import Client
+
         client = Client(self.values['url'])
         if self.values['user']:
             client.set_user(self.values['user'])

@@ -210,7 +210,7 @@ class EgmSource(PaintNode):
         self._poses = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
         self._joints = self.create_publisher(JointState, 'joint_states', profile)
         self.stream = EgmStream(round(1e9 * self.values['lag_s']))
-        self._heard_s = time.monotonic()
+        self._heard_s, self._lacks = time.monotonic(), ''
         self.report({'robot': self.status})
         self.start_thread(self._listen)
 
@@ -260,7 +260,12 @@ class EgmSource(PaintNode):
             elif position := self.stream.take(packet, arrived_ns, sender):
                 self._heard_s = time.monotonic()
                 stamp, pose, joints, axes = position
-                if pose is not None:
+                self._lacks = ''
+                if len(axes) < len(external):
+                    self._lacks = f'{len(axes)} external axes, and external_joints has more'
+                if pose is None:
+                    self._lacks = 'no pose: give EGM a tool and a frame'
+                else:
                     self._poses.publish(pose_message(frame_id, stamp, pose))
                 if len(joints) >= len(names) and len(axes) >= len(external):
                     scaled = axes[: len(external)] * self.values['external_scales']
@@ -288,6 +293,8 @@ class EgmSource(PaintNode):
                 WARN, f'no packets on UDP port {values["port"]}: start EGMStreamStart with the '
                 'address of this machine in UDPUC', figures,
             )  # fmt: skip
+        if self._lacks:
+            return Status(ERROR, f'packets have {self._lacks}', figures)
         if stream.lost or stream.repeated or stream.invalid:
             words = f'{stream.lost} packets lost, {stream.repeated} repeated'
             return Status(WARN, f'{words}, {stream.invalid} no EgmRobot', figures)

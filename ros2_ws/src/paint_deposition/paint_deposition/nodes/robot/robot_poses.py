@@ -3,10 +3,10 @@
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError, RecordingError, did_you_mean
@@ -15,6 +15,7 @@ from paint_deposition.files.recordings.messages import stamp_ns, transforms_of
 from paint_deposition.motion.frame_tree import FrameTree, NoTransform
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
+from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
 
 # (stamp [ns], pose of the tip, when it was sent [ns] or 0)
 TakePose = Callable[[int, Rigid, int], None]
@@ -47,7 +48,7 @@ class JointPoses:
         except RecordingError as error:
             self._incomplete, self._refusal = self._incomplete + 1, str(error)
             return
-        self._received_s = time.monotonic()
+        self._received_s, self._refusal = time.monotonic(), ''
         tip = Rigid.of([*positions[0], *quaternions[0]])
         self._poses += 1
         self._take_pose(stamp_ns(message.header), tip, info['source_timestamp'])
@@ -58,6 +59,8 @@ class JointPoses:
         if self._incomplete and not self._poses:
             return Status(ERROR, f'no joint state has all joints: {self._refusal}', values)
         if time.monotonic() - self._received_s > SILENT_S:
+            if self._refusal:
+                return Status(ERROR, f'joint states are refused: {self._refusal}', values)
             return Status(WARN, f'no joint states on {self._topic}', values)
         return Status(OK, 'following the robot', values)
 
@@ -72,6 +75,9 @@ class TfPoses:
         node: subscribes to tf.
         base, tip: names of the frames.
         take_pose: called with each pose, in the order of the stamps.
+
+    Attributes:
+        topics: the subscriptions, whose quality of service the node matches now and then.
 
     Raises:
         PaintError: tf2_msgs is not installed.
@@ -93,13 +99,13 @@ class TfPoses:
         self._published_ns = 0
         self._failed_lookups = 0
         self._received_s = time.monotonic()
-        latched = DurabilityPolicy.TRANSIENT_LOCAL
-        node.create_subscription(
-            TFMessage, '/tf_static', self._take_static, QoSProfile(depth=100, durability=latched)
-        )
-        node.create_subscription(TFMessage, '/tf', self._take, QoSProfile(depth=QUEUE_DEPTH))
+        subscribe = partial(AdaptiveSubscription, node, TFMessage, depth=QUEUE_DEPTH, polled=False)
+        self.topics = [
+            subscribe('/tf_static', self._take_static, latched=True),
+            subscribe('/tf', self._take),
+        ]
 
-    def _take_static(self, message: Any) -> None:
+    def _take_static(self, message: Any, _info: Mapping[str, Any]) -> None:
         for child, parent, _, pose in transforms_of(message):
             self._tree.fix(child, parent, pose)
 

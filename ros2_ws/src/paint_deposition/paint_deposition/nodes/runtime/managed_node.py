@@ -27,7 +27,8 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     The reverse transition destroys the publishers, timers and so on that a transition created,
     and `cleanup` also those that callbacks created since `configure`: a callback that creates one
     for the time of activity destroys it in `_deactivate`. A PaintError leaves the state as it
-    was; any other error leads to `unconfigured`. Either is logged in one line.
+    was; any other error leads to `unconfigured`. Either is logged in one line. While a request is
+    under way, whose answer needs its service, the node refuses to leave a state.
     """
 
     PARAMETERS: ParameterTable = MANAGED
@@ -88,7 +89,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         if self.active:
             self._leave(self._deactivate)
         if self.configured:
-            self._leave(self._run_cleanup)
+            self._leave(self._cleanup)
 
     def destroy_node(self) -> None:
         super().destroy_node()
@@ -106,13 +107,19 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         return self._transition_result('activated', lambda: self._enter(self._activate))
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('deactivated', lambda: self._leave(self._deactivate))
+        return self._transition_result(
+            'deactivated', lambda: self._leave_if_idle(self._deactivate)
+        )
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('cleaned up', lambda: self._leave(self._run_cleanup))
+        return self._transition_result('cleaned up', lambda: self._leave_if_idle(self._cleanup))
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('shut down', self.close)
+        def shut_down() -> None:
+            self._require_idle()
+            self.close()
+
+        return self._transition_result('shut down', shut_down)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.close()
@@ -122,13 +129,9 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         self._load()
         self.tasks = {**self._configure(), 'state': self._state_status}
 
-    def _run_cleanup(self) -> None:
-        try:
-            self._cleanup()
-        finally:
-            # An aggregator would report a status that is no longer published as stale.
-            for task in self.tasks.keys() - {'state'}:
-                self.tasks[task] = lambda: Status(OK, 'the node is not configured')
+    def _require_idle(self) -> None:
+        if self.awaiting:
+            raise PaintError('a request is under way: call again after it')
 
     def _transition_result(
         self, done: str, transition: Callable[[], None]
@@ -159,12 +162,28 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
             raise
         self._created[-1] = self._entities - before
 
+    def _leave_if_idle(self, step: Callable[[], None]) -> None:
+        self._require_idle()
+        self._leave(step)
+
     def _leave(self, step: Callable[[], None]) -> None:
+        stays = False
         try:
             step()
+        except PaintError:
+            stays = True
+            raise
         finally:
-            created = self._created.pop()
-            self._destroy(created if self.configured else self._entities - self._lasting)
+            if not stays:
+                self._end_of_state()
+
+    def _end_of_state(self) -> None:
+        created = self._created.pop()
+        self._destroy(created if self.configured else self._entities - self._lasting)
+        if not self.configured:
+            # An aggregator would report a status that is no longer published as stale.
+            for task in self.tasks.keys() - {'state'}:
+                self.tasks[task] = lambda: Status(OK, 'the node is not configured')
 
     @property
     def _entities(self) -> set[Any]:

@@ -61,6 +61,7 @@ class PaintNode(Node):
         values: current values of the parameters, by name.
         stopped: whether the thread of this node is to end.
         tasks: the diagnostic tasks, by name.
+        awaiting: number of requests whose work a thread does right now.
         finished: a future that ends the process: its result is the exit code, or an exception.
     """
 
@@ -68,6 +69,7 @@ class PaintNode(Node):
     PARAMETERS: ParameterTable = MappingProxyType({})
     loading = stopping = False
     configured = True
+    awaiting = 0
     _thread: threading.Thread | None = None
 
     def __init__(self, **kwargs: Any):
@@ -135,8 +137,18 @@ class PaintNode(Node):
     # --- for all users
 
     def start_thread(self, work: Callable[[], None]) -> None:
-        """Do work that ends soon once ``stopped`` is set, which closing the node does."""
-        self._thread = threading.Thread(target=work, name=self.get_name(), daemon=True)
+        """Do work that ends soon once ``stopped`` is set, which closing the node does.
+
+        An exception ends the process.
+        """
+
+        def guarded() -> None:
+            try:
+                work()
+            except Exception as error:
+                self.fail(error)
+
+        self._thread = threading.Thread(target=guarded, name=self.get_name(), daemon=True)
         self._thread.start()
 
     def _end_thread(self) -> None:
@@ -159,12 +171,14 @@ class PaintNode(Node):
 
     async def result_of(self, work: concurrent.futures.Future) -> Any:
         """Await work that a thread does; other callbacks run meanwhile."""
+        self.awaiting += 1
         done: Future = Future(executor=self.executor)
         # Completed from another thread, a future does not wake the executor unless it has a
         # callback to run.
         done.add_done_callback(lambda _: None)
         work.add_done_callback(done.set_result)
         await done
+        self.awaiting -= 1
         return work.result()
 
     def finish(self, exit_code: int = 0) -> None:

@@ -1,6 +1,7 @@
 """Topics: names, quality of service, subscriptions that fit their publishers; and messages."""
 
 import importlib
+import math
 import struct
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -211,12 +212,18 @@ def pose_message(frame_id: str, stamp_ns: int, values: Iterable[float]) -> PoseS
     return pose
 
 
+def unknown_state() -> AtomizerState:
+    """A state whose numbers are not known."""
+    kinds = AtomizerState.get_fields_and_field_types()
+    return AtomizerState(**{name: math.nan for name, kind in kinds.items() if kind == 'double'})
+
+
 def state_message(frame_id: str, change: TriggerChange) -> AtomizerState:
     """A state that says no more of the gun than this."""
-    return AtomizerState(
-        header=header(frame_id, change.stamp_ns), spraying=change.flow > 0.0, flow=change.flow,
-        brush=change.brush,
-    )  # fmt: skip
+    state = unknown_state()
+    state.header, state.spraying = header(frame_id, change.stamp_ns), change.flow > 0.0
+    state.flow, state.brush = change.flow, change.brush
+    return state
 
 
 def message_class(type_name: str) -> type:
