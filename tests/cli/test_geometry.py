@@ -162,7 +162,7 @@ def test_inspect_says_and_draws_how_the_gun_ran_over_the_door(tmp_path):
     door, run, picture = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal', tmp_path / 'door.png'
     done = paint('inspect', '--mesh', door, '--trajectory', run, *TRIGGER, '--out', picture)
     assert (done.returncode, done.stderr) == (0, '')
-    assert done.stdout.startswith('3 passes, 0.30 m/s, TCP 0.25 m from the surface')
+    assert done.stdout.startswith('3 passes, 0.30 m/s, TCP 250 mm from the surface')
     assert str(picture) in done.stdout
     with Image.open(picture) as image:
         assert min(image.size) > 1000

@@ -249,7 +249,7 @@ def test_refit_adds_an_effect_by_its_id_and_carries_the_history_on(door_alone, t
 def test_refit_adds_an_effect_of_ones_own(door_alone, tmp_path):
     own = shutil.copy(SAMPLES / 'my_effect.py', tmp_path)
     done = ran('refit', door_alone, '--add', own, '-o', tmp_path / 'out')
-    assert 'added wake_loss' in done.stdout
+    assert 'added as asked: wake_loss' in done.stdout
     entry = yaml.safe_load((tmp_path / 'out/model.yaml').read_text())['effects'][0]
     assert entry['file'].endswith('my_effect.py')
     (effect,) = read_model_file(tmp_path / 'out/model.yaml').model.effects

@@ -44,18 +44,19 @@ def is_picture(path) -> bool:
         return image.width > 600 and len(np.unique(np.asarray(image.convert('L')))) > 20
 
 
-def test_every_option_of_a_recommendation_which_lands_here_without_a_folder(model_file, tmp_path):
+def test_every_option_of_a_recommendation_which_has_a_folder_by_default(model_file, tmp_path):
     options = (
         '--model', model_file, '--target-um', 20, '--index-min', 0.4, '--index-max', 0.7,
         '--tolerance', 0.2, '--width', 1.2, '--length', 2.0, '--one-way', '--standoff', 0.3,
         '--travel-deg', 90, '--gun-turns',
     )  # fmt: skip
     done = ran('recommend', *options, '--json', cwd=tmp_path)
-    names = sorted(path.name for path in tmp_path.iterdir())
+    folder = tmp_path / 'recommendation'
+    names = sorted(path.name for path in folder.iterdir())
     assert names == [MARKER, 'recommendation.json', 'uniformity.png']
-    assert is_picture(tmp_path / 'uniformity.png')
+    assert is_picture(folder / 'uniformity.png')
     content = json.loads(done.stdout)
-    assert content == json.loads((tmp_path / 'recommendation.json').read_text())
+    assert content == json.loads((folder / 'recommendation.json').read_text())
     request = IndexRequest(
         target_um=20.0, index_min_m=0.4, index_max_m=0.7, tolerance=0.2, width_m=1.2,
         length_m=2.0, one_way=True, standoff_m=0.3, travel_rad=np.pi / 2, gun_turns=True,
@@ -65,6 +66,7 @@ def test_every_option_of_a_recommendation_which_lands_here_without_a_folder(mode
     assert content == json.loads(json.dumps(expected.to_dict()))
     done = paint('recommend', *options, cwd=tmp_path)
     assert expected.sentence in done.stdout
+    assert f'SB50 of one pass: {1e3 * expected.sb50_m:.0f} mm' in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -208,6 +208,6 @@ def test_the_working_directory_may_be_the_folder_of_two_commands(tmp_path):
     inode = os.stat(tmp_path).st_ino
     write(tmp_path, 'film.csv', 'film.png')
     for _ in range(2):
-        assert paint('recommend', '--speed', 0.3, cwd=tmp_path).returncode == 0
+        assert paint('recommend', '--speed', 0.3, '-o', '.', cwd=tmp_path).returncode == 0
     assert names_in(tmp_path) == ['recommendation.json', 'uniformity.png']
     assert os.stat(tmp_path).st_ino == inode

@@ -141,7 +141,7 @@ def refused(tmp_path, *arguments):
         ('--mesh', __file__, ['.py', '.stl']),
         ('--mesh', '', ['--mesh is empty']),
         ('--trajectory', '', ['--trajectory is empty']),
-        ('--trajectory', 'nowhere', ['no bag at nowhere']),
+        ('--trajectory', 'nowhere', ['nowhere: no such file; give a bag, a table of poses or']),
         ('--model', 'nowhere.yaml', ['nowhere.yaml', 'no such file']),
         ('--mesh-scale', '-1', ['--mesh-scale', '-1']),
         ('--max-edge-length-m', '1e-6', ['max_edge_length_m', 'give an edge length of at least']),

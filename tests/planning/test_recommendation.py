@@ -134,8 +134,8 @@ def test_gun_that_turns_makes_an_asymmetric_pattern_less_even():
 def test_default_range_follows_the_width_of_the_pattern(scale):
     planar = PlanarPattern(K3=0.0, r_m=0.22 * scale, sigma1_m=0.09 * scale, sigma2_m=0.15 * scale)
     answer = recommended(DepositionModel(planar=planar))
-    assert answer.index_range_m[0] < 0.5 * answer.half_width_m < 1.3 * answer.half_width_m
-    assert answer.index_range_m[1] > 1.3 * answer.half_width_m
+    assert answer.index_range_m[0] < 0.5 * answer.sb50_m < 1.3 * answer.sb50_m
+    assert answer.index_range_m[1] > 1.3 * answer.sb50_m
     assert answer.index_m == pytest.approx(recommended().index_m * scale, rel=1e-3)
     assert recommended().index_range_m == (0.2, 0.8)
 

@@ -350,5 +350,5 @@ def test_a_law_learned_as_asked_is_no_verdict(diagnosis):
     assert f'{told}{law["best"]}, and least, to {law["least"]}.' in page.text
     assert re.fullmatch(r'± [\d.]+ µm at [\d.]+', law['best'])
     before, after = (f'{step.holdout_rmse_um:.2f} µm' for step in done.history)
-    assert f'left out of the fit: {before} → {after}; beyond gauge and texture: ' in page.text
+    assert f'held out of the fit: {before} → {after}; beyond gauge and texture: ' in page.text
     assert page.open == page.clashes == []

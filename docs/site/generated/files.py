@@ -86,7 +86,8 @@ def _keys(model: type[BaseModel], without: set[str] = frozenset()) -> str:
     for key, said in schema['properties'].items():
         if key not in without:
             meaning, bounds = said.get('description', 'text'), _bounds(said)
-            facts = meaning, '' if bounds in meaning else bounds, _default(said, key, schema)
+            told = all(word in meaning for word in bounds.split(', '))
+            facts = meaning.rstrip('.'), '' if told else bounds, _default(said, key, schema)
             rows.setdefault('; '.join(filter(None, facts)), []).append(f'`{key}`')
     return table(('key', 'meaning'), [(', '.join(keys), said) for said, keys in rows.items()])
 

@@ -190,10 +190,10 @@ REFUSED_CELLS = {
     "'12.5' beside it in line 3 has no heading": [
         ['Dicke', None, None], ['Ort', 'Basis', 'Klar'], ['A1', 12.5, 21.5],
     ],
-    "line 3: Dicke .* is '#DIV/0!'; expected .* or n/a where": [
+    "sheet 'S', row 3: Dicke .* is '#DIV/0!'; expected .* or n/a where": [
         SHEET, ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, '#DIV/0!'],
     ],
-    "line 3: X .* is ''": [SHEET, ['A1', 100, 0, 50, 21.5], [None] * 4 + [21.5]],
+    "sheet 'S', row 3: X .* is ''": [SHEET, ['A1', 100, 0, 50, 21.5], [None] * 4 + [21.5]],
 }  # fmt: skip
 
 

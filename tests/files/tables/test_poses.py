@@ -80,6 +80,9 @@ def test_a_workbook_is_a_log_too(tmp_path):
         [0, 1, 2, 3, 0, 0, 0, 1],
         [0.1, 1, 2, '4,5', 0, 0, 0, 1],
     ]
+    twice = write_workbook(tmp_path / 'twice.xlsx', {'Log': rows, 'Old': rows})
+    with pytest.raises(RecordingError, match='from a file with one such sheet: save it by itself'):
+        read_recording(twice)
     path = write_workbook(tmp_path / 'log.xlsx', {'Log': rows})
     assert read_recording(path).positions_m.tolist() == [[1, 2, 3], [1, 2, 4.5]]
 

@@ -135,7 +135,7 @@ def test_a_loop_starts_over(play, listen, wait_until, tmp_path):
 def test_bad_input_is_reported_at_the_start(play, pass_bag):
     for values, says in (
         ({'bag': ''}, 'bag is empty: give the path of a recording'),
-        ({'bag': '/nowhere'}, 'no bag at /nowhere'),
+        ({'bag': '/nowhere'}, '/nowhere: no such file; give a bag'),
         ({'pose_topic': 'atomizer/pos'}, 'its PoseStamped topics: /atomizer/pose'),
         ({'state_topic': '/gun'}, 'its state topics: /atomizer/state'),
         ({'rate': -1.0}, 'rate is -1; give at least 0'),

@@ -137,8 +137,9 @@ class MotionOptions(RobotArm, extra='forbid'):
     )  # fmt: skip
     state_topic: Text | None = given(
         None, 'Trigger of the gun: a topic of AtomizerState or Bool, a number in a field of any '
-        'message, as /io.states[3] or "/io.level > 12", or the column of a table; default: it '
-        'sprays whenever poses flow.', '--state-topic --trigger',
+        'message, as /io.states[3] or "/io.level > 12", or the column of a table; default: of a '
+        'table the column trigger, gun, spraying or on, of RAPID its outputs, of a bag that plan '
+        'or improve wrote its own, else it sprays whenever poses flow.', '--state-topic --trigger',
     )  # fmt: skip
     gun_signal: Text | None = given(
         None, 'Digital output that opens the gun, for a RAPID module that sets several.'
@@ -160,7 +161,9 @@ class MotionOptions(RobotArm, extra='forbid'):
         metavar='CONVENTION',
     )  # fmt: skip
     angle_unit: Literal['deg', 'rad'] | None = given(
-        None, 'Unit of joints and angles; default: that of the headings, else rad.'
+        None,
+        "Unit of joints and angles; default: that of the headings, else deg for a maker's "
+        'angles and rad for others.',
     )
     tool_axis: Literal['x', 'y', 'z', '-x', '-y', '-z'] | None = given(
         None, 'Axis of the recorded tool along which it sprays, x for a KUKA; default: z.'

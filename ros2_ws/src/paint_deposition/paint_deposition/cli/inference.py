@@ -88,9 +88,13 @@ def calibrate_command(seed: int, **given: Any) -> None:
 
 
 def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
+    from paint_deposition.model.eq3_collapse import sb50_m
+
     for value in result.parameters:
         mark = '' if value.determined else '   not determined'
         yield f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
+    for planar in result.model.patterns:
+        yield f'SB50 of one pass: {1e3 * sb50_m(planar):.0f} mm'
     for experiment, found in zip(result.study.campaign.experiments, result.residuals, strict=True):
         yield (
             f'{experiment.name}: {len(found)} points, mean {found.measured_um.mean():.2f} µm '
@@ -240,7 +244,7 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
             )
 
     def lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
-        yield from _diagnosis_lines(diagnosis)
+        yield from _diagnosis_lines(diagnosis, 'added as asked: ')
         if effect_file is not None:
             yield _write_as_effect(diagnosis, effect_file)
 
@@ -263,14 +267,14 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
     return f'effect file: {forms[0].formula}; in a model {{{effect_entry(forms[0], effect_file)}}}'
 
 
-def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
+def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[str]:
     from paint_deposition.report import words
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
     if diagnosis.p_value < 1.0:
         yield f'p-value if nothing is missing: {diagnosis.p_value:.4f}'
     for effects in diagnosis.classes:
-        label = 'added ' if effects.best in diagnosis.accepted else ''
+        label = how if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
         yield f'  {label}{effects.best}: {words.probability_words(effects)}{others}'
         for line in words.law_lines(diagnosis.model.effect(effects.best)):
@@ -280,7 +284,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
     before, after = diagnosis.history[0], diagnosis.history[-1]
     yield (
         f'RMSE {before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on '
-        f'{diagnosis.left_out} left out, {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the '
+        f'{diagnosis.left_out} held out, {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the '
         f'fitted points; gauge and texture {diagnosis.noise_floor_um:.2f} µm'
     )
     yield from (zone.sentence for zone in diagnosis.comparisons[-1].zones)

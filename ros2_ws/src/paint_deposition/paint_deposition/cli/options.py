@@ -219,7 +219,8 @@ ALLOW_EFFECTS = click.option(
 PART_POSE = option_of(MotionOptions, 'part_pose', callback=_pose)
 MAX_POSE_GAP = option_of(OnePart, 'max_pose_gap_s')
 motion_options = options_of(MotionOptions, 'motion', part_pose={'callback': _pose})
-band_options = options_of(FilmBand, 'band')
+none = {'show_default': 'none'}
+band_options = options_of(FilmBand, 'band', target_um=none, tolerance_um=none)
 robot_options = options_of(DrivingRobot, 'robot')
 
 

@@ -31,7 +31,7 @@ PAINT_MOVES = click.option(
 @options.model_option()
 @options.BRUSH
 @options_of(IndexRequest)
-@results_options('recommendation.json and uniformity.png; default: the working directory', '.')
+@results_options('recommendation.json and uniformity.png', 'recommendation')
 def recommend_command(
     request: IndexRequest, model_file: Path | None, brush: int, results: Results
 ) -> None:
@@ -39,7 +39,7 @@ def recommend_command(
     chosen = chosen_model(model_file, brush=brush)
     answer = pd.recommend(chosen.model, **dict(request))
     results.write(answer, model=chosen.model, made_from=inputs(model_file=model_file))
-    lines = [answer.sentence]
+    lines = [answer.sentence, f'SB50 of one pass: {1e3 * answer.sb50_m:.0f} mm']
     lines += (
         f'minimum: sigma_n {100 * minimum.sigma_n:.2f} % at {1e3 * minimum.index_m:.0f} mm'
         for minimum in answer.minima
@@ -65,7 +65,10 @@ def recommend_command(
 @options_of(PlanRequest)
 @options.PART_POSE
 @options.robot_options
-@options.option_of(MotionOptions, 'frame_id')
+@options.option_of(
+    MotionOptions, 'frame_id',
+    help='Frame of the poses that are written; default: part, or base_link with --part-pose.',
+)  # fmt: skip
 @click.option(
     '--faces', type=click.Choice(['one', 'auto']), default='one', show_default=True,
     help='auto: split the part into faces that can be sprayed from one side each, as a hood '
@@ -148,10 +151,10 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
         )
     if first:
         paint = first.statistics
+        more = 100.0 * (paint.emitted_volume_cm3 / film.emitted_volume_cm3 - 1.0)
         yield (
-            f'without --optimise: {first.sentence}; paint {paint.emitted_volume_cm3:.1f} instead '
-            f'of {film.emitted_volume_cm3:.1f} cm3, capture fraction '
-            f'{100 * paint.capture_fraction:.0f} %'
+            f'without --optimise: {first.sentence}; paint sprayed {more:+.0f} %, '
+            f'capture fraction {100 * paint.capture_fraction:.0f} %'
         )
 
 

@@ -48,8 +48,9 @@ class SprayGeometry:
         where = 'TCP nowhere over the part'
         if math.isfinite(self.standoff_m):
             where = (
-                f'TCP {self.standoff_m:.2f} m from the surface ({self.standoff_low_m:.2f} to '
-                f'{self.standoff_high_m:.2f}), z {self.off_normal_deg:.0f} degrees off its normal'
+                f'TCP {1e3 * self.standoff_m:.0f} mm from the surface (90 % of the paint from '
+                f'{1e3 * self.standoff_low_m:.0f} to {1e3 * self.standoff_high_m:.0f} mm), '
+                f'z {self.off_normal_deg:.0f} degrees off its normal'
             )
         return (
             f'{self.passes} {"pass" if self.passes == 1 else "passes"}, '

@@ -127,6 +127,14 @@ def half_width_m(collapse: Collapse) -> float:
     return float(above[-1] - above[0])
 
 
+def sb50_m(planar: PlanarPattern) -> float:
+    """SB50 of a pass along tool y on the model plane [m]."""
+    reach_m = planar.radius_of_flux_m(1e-4)
+    across_m = np.linspace(-reach_m, reach_m, 801)
+    film_um = line_integral_um_m_per_s(planar, across_m)
+    return half_width_m(SampledCollapse(across_m, film_um, planar.sigma1_m))
+
+
 # Nodes of the line integral in the narrower standard deviation: trapezoids of a Gaussian with
 # three of them are exact to 1e-15.
 NODES_PER_SIGMA = 4.0

@@ -286,6 +286,17 @@ class Improvement:
             f'limited by {name}: sigma_n {100 * sigma_n:.1f} % without it'
             for name, sigma_n in self.retiming.binding_limits.items()
         ]
+        window = -self.request.trigger_cut_m, self.request.trigger_shift_m
+        ends = [
+            f'pass {one.number} {verb}' for one in self.changes
+            for verb, metres in (('opens', one.opens_earlier_m), ('closes', one.closes_later_m))
+            if any(end and abs(metres - end) < 0.002 for end in window)
+        ]  # fmt: skip
+        if ends:
+            found.append(
+                f'limited by the trigger window: {", ".join(ends)} at the end of it; allow more '
+                'with --trigger-shift or --trigger-cut'
+            )
         found.append(
             'along this path, without limits and without weights for paint, time and smoothness, '
             f'sigma_n comes down to {100 * self.sigma_n_of_path:.1f} %: beyond that other passes '

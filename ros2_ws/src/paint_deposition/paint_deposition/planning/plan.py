@@ -150,7 +150,7 @@ def plan(
     style = _style(model, request, plane)
     films = LineFilms(
         surface, surface_map, model, style, plane.curve.parallel.first.finest_m,
-        0.5 * plane.half_width_m, lambda share: progress('single passes', share),
+        0.5 * plane.sb50_m, lambda share: progress('single passes', share),
     )  # fmt: skip
     placement = place_passes(films, ends, index_range, request.tolerance)
     count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
@@ -187,7 +187,7 @@ def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) 
         speed_m_per_s=plane.speed_m_per_s,
         acceleration_m_per_s2=request.acceleration_m_per_s2,
         overspray_m=overspray,
-        band_m=0.25 * plane.half_width_m,
+        band_m=0.25 * plane.sb50_m,
         travel_rad=request.travel_rad,
         one_way=request.one_way,
         brush=model.brush,

@@ -41,7 +41,7 @@ class Recommendation:
         length_m: of a pass, that they were counted for.
         curve: sigma_n over the range.
         standoff_m: TCP to plane. request: how the passes run.
-        half_width_m: SB50 of one pass.
+        sb50_m: SB50 of one pass, its width at half its peak.
         index_drift_m: least and largest index that keep to the tolerance, or None.
         standoff_drift_m: least and largest change of standoff that do, negative is nearer; None
             with effects, which may depend on the standoff by themselves.
@@ -62,7 +62,7 @@ class Recommendation:
     curve: IndexCurve
     standoff_m: float
     request: IndexRequest
-    half_width_m: float
+    sb50_m: float
     index_drift_m: tuple[float, float] | None
     standoff_drift_m: tuple[float, float] | None
     notes: tuple[str, ...]
@@ -172,7 +172,7 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         curve=curve,
         standoff_m=standoff,
         request=request,
-        half_width_m=width,
+        sb50_m=width,
         index_drift_m=index_drift,
         standoff_drift_m=standoff_drift,
         notes=tuple(notes),
@@ -252,8 +252,8 @@ def _notes(
         notes.append('there is no minimum of sigma_n here; it is more even at a smaller index')
     elif request.tolerance is None and end.sigma_n < best.sigma_n:
         notes.append(
-            f'the end of the range is more even still: sigma_n {100 * end.sigma_n:.2f} % at '
-            f'{1e3 * end.index_m:.0f} mm'
+            f'at the end of the range, {1e3 * end.index_m:.0f} mm, sigma_n is only '
+            f'{100 * end.sigma_n:.2f} %, but no minimum'
         )
     mean = curve.parallel.mean_um(best.index_m)
     if request.target_um is not None and abs(mean / request.target_um - 1.0) > 1e-3:

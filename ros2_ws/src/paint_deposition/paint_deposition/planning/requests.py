@@ -32,13 +32,24 @@ class PassRequest(FilmBuild):
     """How passes run and what they lay."""
 
     index_min_m: float | None = given(
-        None, 'Least index [m].', '--index-min', least=0.001, most=10.0
+        None,
+        'Least index [m]; default: 0.2, of an unusual SB50 0.35 of it.',
+        '--index-min',
+        least=0.001,
+        most=10.0,
     )
     index_max_m: float | None = given(
-        None, 'Greatest index [m].', '--index-max', least=0.001, most=10.0
+        None,
+        'Greatest index [m]; default: 0.8, of an unusual SB50 1.4 of it.',
+        '--index-max',
+        least=0.001,
+        most=10.0,
     )
     tolerance: float | None = given(
-        None, 'Largest sigma_n accepted, 0.05 for 5 %.', above=0.0, below=1.0
+        None,
+        'Largest sigma_n accepted, 0.05 for 5 %; no tolerance of the film.',
+        above=0.0,
+        below=1.0,
     )
     one_way: bool = given(False, 'Every pass in one direction; default: they alternate.')
     standoff_m: float | None = given(
@@ -198,7 +209,8 @@ class ImproveRequest(Limits):
         None, 'Mean film wanted [µm]; default: that of the programme.', above=0.0
     )
     tolerance: float | None = given(
-        None, 'Accepted difference from the target, 0.1 for 10 %; film outside counts more.',
+        None, 'Accepted difference of the film from its target, 0.1 for 10 %, which is no '
+        'sigma_n; film outside counts more.',
         above=0.0, below=1.0,
     )  # fmt: skip
     paint_weight: float = given(

@@ -279,7 +279,9 @@ def mcap_files(path: Path) -> list[Path]:
 def _require_bag(path: Path) -> None:
     """Refuse what is no bag, and one that its recorder has not finished."""
     if not path.exists():
-        raise RecordingError(f'no bag at {path}')
+        raise RecordingError(
+            f'{path}: no such file; give a bag, a table of poses or a RAPID module'
+        )
     for file in path.iterdir() if path.is_dir() else [path]:
         require_file(file, RecordingError, math.inf)
     names = [file.name.removesuffix('.zstd') for file in path.iterdir()] if path.is_dir() else []

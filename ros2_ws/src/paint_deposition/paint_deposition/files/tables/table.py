@@ -109,7 +109,9 @@ class Table:
         """Refuse the file with all that is wrong in its lines, up to a number."""
         if not self._errors:
             return
-        lines = [f'line {line}: {text}' for line, text in sorted(self._errors.items())]
+        sheet = re.match(r"sheet '.*'", self.form)
+        place = f'{sheet[0]}, row' if sheet else 'line'
+        lines = [f'{place} {line}: {text}' for line, text in sorted(self._errors.items())]
         count = f'{len(lines)} errors: ' if len(lines) > 1 else ''
         if (more := len(lines) - MOST_ERRORS_SHOWN) > 0:
             lines[MOST_ERRORS_SHOWN:] = [f'and {more} more']

@@ -75,7 +75,7 @@ def film_picture(
     if rows == 2:
         _draw_band(axes[0], part, film_um, spray, statistics, zones)
         _draw_band_legend(figure, grid[0, 1], surface, film_um, statistics, zones)
-    figure.suptitle(title, x=0.02, ha='left', fontsize=13, color=INK)
+    figure.suptitle(f'{title}, seen from the gun', x=0.02, ha='left', fontsize=13, color=INK)
     axes[0].set_title(fill(subtitle, 110), loc='left', fontsize=9, color=MUTED)
     return figure
 

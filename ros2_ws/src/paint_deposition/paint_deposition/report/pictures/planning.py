@@ -230,7 +230,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
         part.draw_zones(one, result.wanted.zones, driven)
         draw_tool_path(one, driven, part.view, low, high)
         s, more = laid.statistics, laid.paint_cm3 / result.before.paint_cm3 - 1.0
-        paint = 'paint sprayed ' + (f'{more:+.0%}' if abs(more) >= 5e-3 else 'as before')
+        paint = 'paint sprayed ' + (f'{100 * more:+.0f} %' if abs(more) >= 5e-3 else 'as before')
         title = (
             f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
             f'{s.min_um:.1f} to {s.max_um:.1f} µm, {paint}, {laid.cycle_s:.1f} s'
