@@ -66,9 +66,13 @@ def spot(x_m: float = 0.0, z_m: float = 0.0, standoff_m: float = STANDOFF_M) -> 
 
 
 def serpentine(
-    heights_m=(0.0,), half_width_m: float = 0.45, opens_at_m: float = 0.25,
-    speed_m_per_s: float = 0.3, period_s: float = 0.02, flow: float = 1.0,
-) -> pd.Trajectory:  # fmt: skip
+    heights_m=(0.0,),
+    half_width_m: float = 0.45,
+    opens_at_m: float = 0.25,
+    speed_m_per_s: float = 0.3,
+    period_s: float = 0.02,
+    flow: float = 1.0,
+) -> pd.Trajectory:
     """Level passes in turn to +x and -x; the gun is open within +- opens_at_m."""
     corners = []
     for number, height in enumerate(heights_m):
@@ -96,9 +100,12 @@ def path_of(trajectory: pd.Trajectory) -> SprayPath:
 
 
 def painted(
-    surface: pd.Surface, motion: pd.Trajectory | SprayPath, *effects: Effect,
-    model: pd.DepositionModel = MODEL, precision='double',
-) -> FilmIntegrator:  # fmt: skip
+    surface: pd.Surface,
+    motion: pd.Trajectory | SprayPath,
+    *effects: Effect,
+    model: pd.DepositionModel = MODEL,
+    precision='double',
+) -> FilmIntegrator:
     """The surface after the motion, with these effects."""
     path = motion if isinstance(motion, SprayPath) else path_of(motion)
     model = model.model_copy(update={'effects': effects})

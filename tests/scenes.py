@@ -23,9 +23,12 @@ def stamps_ns(times_s) -> np.ndarray:
 
 
 def straight_pass(
-    times_s, begin_m=(-0.6, 0.0, NORMAL_STANDOFF_M), end_m=(0.6, 0.0, NORMAL_STANDOFF_M),
-    quaternion=LOOKING_DOWN, **trigger,
-) -> Trajectory:  # fmt: skip
+    times_s,
+    begin_m=(-0.6, 0.0, NORMAL_STANDOFF_M),
+    end_m=(0.6, 0.0, NORMAL_STANDOFF_M),
+    quaternion=LOOKING_DOWN,
+    **trigger,
+) -> Trajectory:
     """An even motion from begin to end, sampled at these times."""
     times = np.asarray(times_s, dtype=float)
     share = ((times - times[0]) / (times[-1] - times[0]))[:, np.newaxis]

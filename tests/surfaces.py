@@ -14,9 +14,12 @@ Depth = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def triangulated(
-    depth: Depth, spacing_m: float, half_width_m: float = 0.2, half_height_m: float | None = None,
+    depth: Depth,
+    spacing_m: float,
+    half_width_m: float = 0.2,
+    half_height_m: float | None = None,
     jitter: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Vertices and faces of the surface y = depth(x, z), outward to -y.
 
     ``jitter`` moves the grid's vertices by that share of the spacing, those on the rim along it.

@@ -159,11 +159,13 @@ def test_launch_takes_the_robot_of_a_bag_from_the_bag():
 @pytest.mark.parametrize(
     ('given', 'count'),
     [
-        ({}, 1), ({'record': 'runs'}, 2), ({'measurements': "painter's.csv"}, 2),
+        ({}, 1),
+        ({'record': 'runs'}, 2),
+        ({'measurements': "painter's.csv"}, 2),
         ({'record': '1', 'measurements': 'readings.csv', 'page': 'true'}, 4),
         ({'wait_for_subscribers': '5'}, 5),
     ],
-)  # fmt: skip
+)
 def test_launched_replay_waits_for_every_node_that_takes_poses(given, count):
     assert wanted(bag='run', **given)['bag_player']['wait_for_subscribers'] == count
 

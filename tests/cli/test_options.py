@@ -53,10 +53,12 @@ def test_help_shows_text_default_and_bounds():
 @pytest.mark.parametrize(
     ('words', 'said'),
     [
-        (('--speed', 0), '--speed'), (('--speed', 'nan'), 'nan is not finite'),
-        (('--lean-deg', 50), '--lean-deg'), (('--outward', 1, 2), '--outward'),
+        (('--speed', 0), '--speed'),
+        (('--speed', 'nan'), 'nan is not finite'),
+        (('--lean-deg', 50), '--lean-deg'),
+        (('--outward', 1, 2), '--outward'),
     ],
-)  # fmt: skip
+)
 def test_what_is_out_of_bounds_is_refused_by_the_name_of_its_option(words, said):
     done = run(*words)
     assert done.exit_code == 2

@@ -208,8 +208,15 @@ def zones(tmp_path):
 
 def test_simulate_counts_each_zone_against_its_band(panel, one_pass, zones, tmp_path):
     whole = (
-        'simulate', '--mesh', panel, '--trajectory', one_pass, *COARSE, '-o', tmp_path / 'out',
-    )  # fmt: skip
+        'simulate',
+        '--mesh',
+        panel,
+        '--trajectory',
+        one_pass,
+        *COARSE,
+        '-o',
+        tmp_path / 'out',
+    )
     done = ran(*whole, '--zones', zones)
     figures = json.loads((tmp_path / 'out/stats.json').read_text())
     foot, head = figures['zones']

@@ -109,9 +109,11 @@ def test_a_sphere_takes_what_the_cone_to_its_limb_holds(standoff_m, radius_m):
 
 
 @given(
-    position=st.tuples(*[st.floats(-1.0, 1.0)] * 3), seed=st.integers(0, 1000),
-    offset=st.floats(-0.2, 0.5), K3=st.floats(0.0, 1.0),
-)  # fmt: skip
+    position=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
+    seed=st.integers(0, 1000),
+    offset=st.floats(-0.2, 0.5),
+    K3=st.floats(0.0, 1.0),
+)
 def test_no_negative_or_infinite_flux_from_anywhere(position, seed, offset, K3):
     orientation = Rotation.random(2, rng=seed)
     normal = orientation[0].apply([0.0, 0.0, 1.0])

@@ -53,10 +53,16 @@ def sprays(table: Path, nozzle: str) -> dict[Spray, np.ndarray]:
 
 
 def spray_campaign(
-    table: Path, nozzle: str, folder: Path, *, heights_in: Sequence[int] = HEIGHTS_IN,
-    as_repeats: bool = False, hanging: str = 'column', told_times: float = 1.0,
+    table: Path,
+    nozzle: str,
+    folder: Path,
+    *,
+    heights_in: Sequence[int] = HEIGHTS_IN,
+    as_repeats: bool = False,
+    hanging: str = 'column',
+    told_times: float = 1.0,
     told_off_m: float = 0.0,
-) -> Path:  # fmt: skip
+) -> Path:
     """Write the campaign of a nozzle into an empty folder and return its ``campaign.yaml``.
 
     Args:

@@ -14,9 +14,14 @@ class NodeProcess:
     """
 
     def __init__(
-        self, log: Path, executable: str, *, code: str = '', ros_arguments: tuple[str, ...] = (),
+        self,
+        log: Path,
+        executable: str,
+        *,
+        code: str = '',
+        ros_arguments: tuple[str, ...] = (),
         **parameters: object,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._out, self._err = log.with_suffix('.out'), log.with_suffix('.err')
         program = code or (
             f'import sys; from paint_deposition.nodes.executables import {executable}; '
@@ -30,8 +35,11 @@ class NodeProcess:
         with self._out.open('wb') as out, self._err.open('wb') as err:
             self._process = subprocess.Popen(
                 [sys.executable, '-c', program, '--ros-args', *arguments, *ros_arguments],
-                stdout=out, stderr=err, env=os.environ | {'PYTHONUNBUFFERED': '1'}, cwd=log.parent,
-            )  # fmt: skip
+                stdout=out,
+                stderr=err,
+                env=os.environ | {'PYTHONUNBUFFERED': '1'},
+                cwd=log.parent,
+            )
 
     @property
     def out(self) -> str:

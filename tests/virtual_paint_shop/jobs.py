@@ -100,21 +100,28 @@ class Job:
 
 
 def draw_plan(
-    rng: np.random.Generator, part: Part, index_m: float, half_width_m: float, direction: str,
+    rng: np.random.Generator,
+    part: Part,
+    index_m: float,
+    half_width_m: float,
+    direction: str,
     gun: str,
-) -> Plan:  # fmt: skip
+) -> Plan:
     """A believable plan; `gun` is 'outside' (spraying well past the edges) or 'near_edge'."""
     across = part.height_m if direction == 'horizontal' else part.width_m
     outside = rng.uniform(0.35, 0.60) * half_width_m
     margin = rng.uniform(0.03, 0.08) * rng.choice([-1.0, 1.0])
     return Plan(
-        direction, index_m, int(np.clip(np.rint(across / index_m) + 1, 3, 6)),
-        standoff_m=rng.uniform(0.20, 0.30), follow=rng.uniform(0.3, 0.9),
+        direction,
+        index_m,
+        int(np.clip(np.rint(across / index_m) + 1, 3, 6)),
+        standoff_m=rng.uniform(0.20, 0.30),
+        follow=rng.uniform(0.3, 0.9),
         overrun_m=outside + 0.04 if gun == 'outside' else rng.uniform(0.10, 0.20),
         gun_margin_m=outside if gun == 'outside' else margin,
         roll_rad=rng.choice([0.0, np.pi / 2, np.pi, rng.uniform(-np.pi, np.pi)]),
         teach_error_m=rng.uniform(0.001, 0.006),
-    )  # fmt: skip
+    )
 
 
 def drive(part: Part, plan: Plan, rng: np.random.Generator) -> Motion:
@@ -186,10 +193,12 @@ def record(motion: Motion, sample_s: float, rng: np.random.Generator) -> Log:
     quaternions[1:] *= flips[:, None]
     events = np.concatenate([[ticks[0]], motion.trigger_s])
     return Log(
-        epoch + np.rint(ticks * 1e9).astype(np.int64), tcp, quaternions,
+        epoch + np.rint(ticks * 1e9).astype(np.int64),
+        tcp,
+        quaternions,
         epoch + np.rint(events * 1e9).astype(np.int64),
         np.concatenate([[False], motion.trigger_on]),
-    )  # fmt: skip
+    )
 
 
 def orthonormal(turn: np.ndarray) -> np.ndarray:

@@ -47,9 +47,12 @@ def driven(trajectory) -> Motion:
     """The motion of poses and triggers as a bag has them: stamps, positions, quaternions, flow."""
     start = trajectory.stamps_ns[0]
     return motion_of(
-        (trajectory.stamps_ns - start) * 1e-9, trajectory.positions_m, trajectory.quaternions_xyzw,
-        (trajectory.trigger_stamps_ns - start) * 1e-9, trajectory.trigger_flow > 0.0,
-    )  # fmt: skip
+        (trajectory.stamps_ns - start) * 1e-9,
+        trajectory.positions_m,
+        trajectory.quaternions_xyzw,
+        (trajectory.trigger_stamps_ns - start) * 1e-9,
+        trajectory.trigger_flow > 0.0,
+    )
 
 
 @dataclass(frozen=True)

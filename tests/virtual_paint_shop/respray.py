@@ -34,10 +34,16 @@ def sprayed_again(
 
 
 def respray(
-    pattern: Pattern, truths: list[Truth], experiment: Experiment, changes: Sequence[str],
-    seed: int, *, stand: Mapping[str, float] | None = None, noise: GaugeNoise = USUAL_NOISE,
+    pattern: Pattern,
+    truths: list[Truth],
+    experiment: Experiment,
+    changes: Sequence[str],
+    seed: int,
+    *,
+    stand: Mapping[str, float] | None = None,
+    noise: GaugeNoise = USUAL_NOISE,
     parcels: int = PARCELS,
-) -> Experiment:  # fmt: skip
+) -> Experiment:
     """Paint another part like that of an experiment, with changes, and measure the same points.
 
     stand: where the gun stands still instead of running its passes (x_m, y_m, z_m), how far off

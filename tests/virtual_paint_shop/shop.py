@@ -58,12 +58,22 @@ class Taking:
 
 
 def generate(
-    seed: int, truth: str | list[str] | None = None, *, experiments: tuple[str, ...] = ('door',),
-    readings: int = 100, repeats: int = 25, heldout: int = 60, style: str | None = None,
-    noise: GaugeNoise = USUAL_NOISE, amplitude: float | dict | None = None, scale: float = 1.0,
-    gun: str | None = None, parcels: int = PARCELS, mesh_edge_m: float = 0.012,
+    seed: int,
+    truth: str | list[str] | None = None,
+    *,
+    experiments: tuple[str, ...] = ('door',),
+    readings: int = 100,
+    repeats: int = 25,
+    heldout: int = 60,
+    style: str | None = None,
+    noise: GaugeNoise = USUAL_NOISE,
+    amplitude: float | dict | None = None,
+    scale: float = 1.0,
+    gun: str | None = None,
+    parcels: int = PARCELS,
+    mesh_edge_m: float = 0.012,
     second_brush: float | None = None,
-) -> Campaign:  # fmt: skip
+) -> Campaign:
     """A campaign; the same seed gives the same doors, paths, layout and noise for any truth.
 
     truth: None, an effect id, 'id~form', 'unknown:...', 'footprint:...' ('*' for any), 'a+b' or a
@@ -89,9 +99,13 @@ def generate(
 
 
 def panel_study(
-    seed: int, index_m: float = 0.577, *, readings: int = 75, repeats: int = 15,
+    seed: int,
+    index_m: float = 0.577,
+    *,
+    readings: int = 75,
+    repeats: int = 15,
     parcels: int = PARCELS,
-) -> Campaign:  # fmt: skip
+) -> Campaign:
     """A flat panel, three passes at `index_m`; the bell depends on the seed alone.
 
     It is a 50 mm bell like the paper's (SB50 near 0.57 m) at about the standoff of the model
@@ -217,8 +231,10 @@ def _campaign(
     brushes: Mapping[int, Pattern],
 ) -> Campaign:  # fmt: skip
     truth = {
-        'seed': seed, 'id': '+'.join(t.id for t in truths) or 'clean',
-        'hidden': [t.as_dict() for t in truths], 'pattern': asdict(pattern),
+        'seed': seed,
+        'id': '+'.join(t.id for t in truths) or 'clean',
+        'hidden': [t.as_dict() for t in truths],
+        'pattern': asdict(pattern),
         'brushes': {number: asdict(each) for number, each in brushes.items()},
-    }  # fmt: skip
+    }
     return Campaign(seed, pattern, tuple(painted), plain(truth))

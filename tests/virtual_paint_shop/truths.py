@@ -111,10 +111,13 @@ class Truth:
 
     def as_dict(self) -> dict:
         return {
-            'id': self.id, 'form': self.form, 'family': self.family,
-            'amplitude': float(self.amplitude), 'unit': self.unit,
+            'id': self.id,
+            'form': self.form,
+            'family': self.family,
+            'amplitude': float(self.amplitude),
+            'unit': self.unit,
             **{k: plain(v) for k, v in self.drawn.items()},
-        }  # fmt: skip
+        }
 
 
 def changes_flight(truth: Truth) -> bool:
@@ -154,9 +157,11 @@ def library() -> dict[str, type[Truth]]:
 
 
 def choose(
-    spec: str | list[str] | None, rng: np.random.Generator, amplitude: float | dict | None = None,
+    spec: str | list[str] | None,
+    rng: np.random.Generator,
+    amplitude: float | dict | None = None,
     scale: float = 1.0,
-) -> list[Truth]:  # fmt: skip
+) -> list[Truth]:
     """Truths named by `spec`: None, 'air_drift', 'air_drift+sag~yield', 'unknown:*', a list."""
     if spec is None or spec == 'clean':
         return []

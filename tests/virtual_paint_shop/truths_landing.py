@@ -245,9 +245,11 @@ class Occlusion(Truth):
     def details(cls, rng):
         return {
             'kind': str(rng.choice(['ledge', 'trim', 'bar'], p=[0.1, 0.35, 0.55])),
-            'at': rng.uniform(0.25, 0.75), 'from': rng.uniform(0.0, 0.2),
-            'to': rng.uniform(0.75, 1.0), 'gap_m': rng.uniform(0.07, 0.12),
-        }  # fmt: skip
+            'at': rng.uniform(0.25, 0.75),
+            'from': rng.uniform(0.0, 0.2),
+            'to': rng.uniform(0.75, 1.0),
+            'gap_m': rng.uniform(0.07, 0.12),
+        }
 
     def obstacle(self, part: Part) -> tuple[np.ndarray, np.ndarray]:
         """Vertices and faces of the body: a box section swept along the surface."""

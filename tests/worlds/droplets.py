@@ -39,9 +39,12 @@ TRACED = 0.004
 FREE = {'K1_cm3_per_s': 0.5, 'K2': 0.2, 'K3': 0.2, 'phi_rad': 0.6, 'r_m': 0.25, 'sigma1_m': 0.25,
         'sigma2_m': 0.25}  # fmt: skip
 NAMES = {
-    'gauge_zero': 'offset_um', 'gun_wake': 'lag_s', 'overspray_fog': 'fog_um', 'pose_lag': 'lag_s',
+    'gauge_zero': 'offset_um',
+    'gun_wake': 'lag_s',
+    'overspray_fog': 'fog_um',
+    'pose_lag': 'lag_s',
     'tcp_standoff': 'offset_z_m',
-}  # fmt: skip
+}
 # Angle of the truth, and parameters of the law, along the axes of the tool.
 TURNED = {
     'tcp_offset': ('direction_rad', 'offset_x_m', 'offset_y_m'),
@@ -83,12 +86,15 @@ def draw_case(seed: int, kind: str, truths: tuple[str, ...] | None = None) -> Ca
         bool(rng.random() < 0.5),
         float(_log_uniform(rng, *MESH_EDGES_M)),
         GaugeNoise(
-            floor_um=rng.uniform(0.4, 1.0), relative=rng.uniform(0.0, 0.01),
-            heavy_tails=bool(rng.random() < 0.2), session_offset_um=_log_uniform(rng, 0.3, 1.0),
-            texture=_log_uniform(rng, 0.005, 0.015), level=_log_uniform(rng, 0.01, 0.04),
+            floor_um=rng.uniform(0.4, 1.0),
+            relative=rng.uniform(0.0, 0.01),
+            heavy_tails=bool(rng.random() < 0.2),
+            session_offset_um=_log_uniform(rng, 0.3, 1.0),
+            texture=_log_uniform(rng, 0.005, 0.015),
+            level=_log_uniform(rng, 0.01, 0.04),
             slip_fraction=0.01 if rng.random() < 0.2 else 0.0,
         ),
-    )  # fmt: skip
+    )
 
 
 def amplitude(truth: type[Truth], rng: np.random.Generator) -> float:
@@ -100,11 +106,17 @@ def _painted(case: Case, parcels: int) -> Campaign:
     """The case's parts with their films; the noise in their readings is one draw of many."""
     each = -(-case.readings // len(case.layout))
     return generate(
-        case.seed, list(case.truths) or None, experiments=case.layout, readings=each,
-        repeats=0 if case.stated else max(each // 4, 8), heldout=80, noise=case.noise,
-        amplitude=dict(zip(case.truths, case.amplitudes, strict=True)), parcels=parcels,
+        case.seed,
+        list(case.truths) or None,
+        experiments=case.layout,
+        readings=each,
+        repeats=0 if case.stated else max(each // 4, 8),
+        heldout=80,
+        noise=case.noise,
+        amplitude=dict(zip(case.truths, case.amplitudes, strict=True)),
+        parcels=parcels,
         mesh_edge_m=case.mesh_edge_m,
-    )  # fmt: skip
+    )
 
 
 def _drawn_truths(kind: str, rng: np.random.Generator) -> tuple[str, ...]:
@@ -135,9 +147,12 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def paint(
-    seed: int, kind: str, effects: tuple[str, ...] | None = None, case: Case | None = None,
+    seed: int,
+    kind: str,
+    effects: tuple[str, ...] | None = None,
+    case: Case | None = None,
     parcels: int = PARCELS,
-) -> Painted:  # fmt: skip
+) -> Painted:
     """A case painted and measured, with what a judge of a diagnosis needs to know.
 
     Args:

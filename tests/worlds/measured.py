@@ -53,10 +53,13 @@ def measured() -> Measured:
     varnish = _table('varnish_dft_operator_gate_day_mils')['thickness'].reshape(-1, 2)
     film = ring['thickness_arb_likely_nm']
     return Measured(
-        tuple(fans), (track['station_ft'] / 90.0, track['depth_in'] / track['depth_in'].max()),
-        (ring['r_from_centre_mm'] / 115.0, film / film.max()), tuple(remainders),
-        panels / panels.mean() - 1.0, 25.4 * (varnish[:, 0] - varnish[:, 1]) / np.sqrt(2.0),
-    )  # fmt: skip
+        tuple(fans),
+        (track['station_ft'] / 90.0, track['depth_in'] / track['depth_in'].max()),
+        (ring['r_from_centre_mm'] / 115.0, film / film.max()),
+        tuple(remainders),
+        panels / panels.mean() - 1.0,
+        25.4 * (varnish[:, 0] - varnish[:, 1]) / np.sqrt(2.0),
+    )
 
 
 def _table(name: str) -> np.ndarray:

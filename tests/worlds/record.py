@@ -47,10 +47,14 @@ class Part:
         _write_csv(folder / f'{self.name}.csv', self.read_m, self.point, self.thickness_um,
                    self.sigma_um)  # fmt: skip
         return {
-            'name': self.name, 'mesh': f'{self.name}.stl', 'trajectory': self.name,
-            'pose_topic': POSE_TOPIC, 'state_topic': STATE_TOPIC,
-            'measurements': f'{self.name}.csv', 'down': [0.0, 0.0, -1.0],
-        }  # fmt: skip
+            'name': self.name,
+            'mesh': f'{self.name}.stl',
+            'trajectory': self.name,
+            'pose_topic': POSE_TOPIC,
+            'state_topic': STATE_TOPIC,
+            'measurements': f'{self.name}.csv',
+            'down': [0.0, 0.0, -1.0],
+        }
 
 
 @dataclass(frozen=True)

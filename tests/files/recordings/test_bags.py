@@ -21,9 +21,13 @@ def same(read: pd.Trajectory, written: pd.Trajectory) -> bool:
     return read.frame_id == written.frame_id and all(
         np.array_equal(getattr(read, name), getattr(written, name))
         for name in (
-            'stamps_ns', 'positions_m', 'quaternions_xyzw', 'trigger_stamps_ns', 'trigger_flow',
+            'stamps_ns',
+            'positions_m',
+            'quaternions_xyzw',
+            'trigger_stamps_ns',
+            'trigger_flow',
         )
-    )  # fmt: skip
+    )
 
 
 def refusal(*arguments) -> str:

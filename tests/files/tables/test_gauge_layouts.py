@@ -62,12 +62,15 @@ def test_predictions_are_written_beside_the_columns_of_the_file(tmp_path):
 def test_spreadsheet(tmp_path):
     """Title rows, numbers as numbers and as text with a comma, a second sheet without readings."""
     rows = [
-        ['Türaußenhaut, Los 17'], [],
+        ['Türaußenhaut, Los 17'],
+        [],
         [None, 'Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke (µm)', 'i.O.?'],
-        [None, 'A1', 100, 0, 50, 21.5, 'ja'], [None, 'A1', 100, 0, 50, '22,1', 'ja'],
-        [None, 'A2', 100, 0, 200, 24, 'ja'], [None, 'A3', 250, 0, 350, '19,4', 'nein'],
+        [None, 'A1', 100, 0, 50, 21.5, 'ja'],
+        [None, 'A1', 100, 0, 50, '22,1', 'ja'],
+        [None, 'A2', 100, 0, 200, 24, 'ja'],
+        [None, 'A3', 250, 0, 350, '19,4', 'nein'],
         [None, 'Mittelwert', None, None, None, 21.75],
-    ]  # fmt: skip
+    ]
     path = tmp_path / 'tuer.xlsx'
     write_workbook(path, {'Deckblatt': [['Kunde', 'Werk 3']], 'Messung': rows})
     readings = read_readings(path)
@@ -84,9 +87,11 @@ def test_open_document_whose_empty_rest_is_said_to_repeat(tmp_path):
     """As LibreOffice writes it: empty cells and rows to the end of the sheet."""
     rows = [
         ('Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke [µm]'),
-        ('A1', 100.0, 0.0, 50.0, 21.5), ('A1', 100.0, 0.0, 50.0, 22.1),
-        ('A2', 100.0, 0.0, 200.0, 24.0), ('A3', 250.0, 0.0, 350.0, 19.4),
-    ]  # fmt: skip
+        ('A1', 100.0, 0.0, 50.0, 21.5),
+        ('A1', 100.0, 0.0, 50.0, 22.1),
+        ('A2', 100.0, 0.0, 200.0, 24.0),
+        ('A3', 250.0, 0.0, 350.0, 19.4),
+    ]
     rest = open_row(rows=1_048_571, empty=16_384)
     path = tmp_path / 'tuer.ods'
     path.write_bytes(open_document(''.join(open_row(*row, empty=16_379) for row in rows) + rest))

@@ -28,9 +28,11 @@ MERGED = [
 CASES: dict[str, tuple[str, ...]] = {
     'coatmaster Flex, CSV or JSON': ('coatmaster.csv', '21.5 22.5 19.5', 'P1 P2 P4'),
     'coatmaster Flex, JSON': ('coatmaster.json', '21.5 22.5 19.5', 'P1 P2 P4'),
-    'BYK auto-chart': ('byk.csv',), 'DeFelsko PosiTector, Value': ('positector_value.csv',),
+    'BYK auto-chart': ('byk.csv',),
+    'DeFelsko PosiTector, Value': ('positector_value.csv',),
     'DeFelsko PosiTector, Thickness': ('positector_thickness.csv',),
-    'PosiTector batch, folder': ('B1',), 'PosiTector batch, zip': ('B1.zip',),
+    'PosiTector batch, folder': ('B1',),
+    'PosiTector batch, zip': ('B1.zip',),
     'PosiTector, serial': ('serial.txt',),
     'PosiTector, serial with a missing one': ('serial_missing.txt', '21.5 19.5', 'P1 P4'),
     'Fischer, printed': ('printed.txt',),
@@ -39,7 +41,7 @@ CASES: dict[str, tuple[str, ...]] = {
     'Japanese': ('japanese.csv', '21.5 21.7 22.5 22.3', 'P1 P1 P2 P2'),
     'two rows of headings': ('merged.xlsx', '21.5 22.5', 'P1 P2'),
     'repeats in a cell': ('repeats.csv', '21.5 22.1 21 22.5', 'P1 P1 P1 P2'),
-}  # fmt: skip
+}
 
 
 @pytest.fixture

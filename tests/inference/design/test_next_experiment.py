@@ -204,9 +204,11 @@ def test_the_log_odds_are_those_of_readings_that_are_drawn():
 def test_nothing_tells_between_explanations_that_say_the_same():
     told = forecast()
     same = replace(
-        told, log_weight=np.zeros(3), means=np.tile(told.means[0], (3, 1)),
+        told,
+        log_weight=np.zeros(3),
+        means=np.tile(told.means[0], (3, 1)),
         factors=np.tile(told.factors[0], (3, 1, 1)),
-    )  # fmt: skip
+    )
     assert same.separations == pytest.approx((0.0, 0.0), abs=1e-6)
     assert same.chance == 0.0
 

@@ -36,9 +36,11 @@ KNOWN = replace(PARAMETERS, known=correlated(PARAMETERS))
 
 
 def linear_fit(
-    random: np.random.Generator, count: int, data: np.ndarray | None = None,
+    random: np.random.Generator,
+    count: int,
+    data: np.ndarray | None = None,
     parameters: FreeParameters = PARAMETERS,
-) -> Fit:  # fmt: skip
+) -> Fit:
     """A fit of readings (count,), drawn if not given, of a linear model with noise 1."""
     prior = parameters.prior
     jacobian = random.normal(size=(count, len(prior.centre))) @ prior.whitening

@@ -77,9 +77,12 @@ def shifted(null: NullModel, change: np.ndarray) -> NullModel:
 
 
 def space_of(
-    plain: NullModel, found: list[Explanation], discrepancy: ModelDiscrepancy,
-    *sizes: DiscrepancyHyperparameters, freedom: float = np.inf,
-) -> ModelSpace:  # fmt: skip
+    plain: NullModel,
+    found: list[Explanation],
+    discrepancy: ModelDiscrepancy,
+    *sizes: DiscrepancyHyperparameters,
+    freedom: float = np.inf,
+) -> ModelSpace:
     weighed = [WeightedNull.of(plain, discrepancy, one, freedom) for one in sizes or (SMALL,)]
     return ModelSpace(weighed, found, discrepancy, freedom)
 

@@ -72,9 +72,15 @@ def readings_at(positions_m, film_um, noise_um=0.3, repeats=2, seed=0) -> pd.Rea
 
 
 def painted_by(
-    model: pd.DepositionModel, motion: pd.Trajectory | SprayPath, points_m: np.ndarray, *,
-    surface: pd.Surface = PANEL, name: str = 'panel', texture: np.ndarray | float = 1.0, **noise,
-) -> Experiment:  # fmt: skip
+    model: pd.DepositionModel,
+    motion: pd.Trajectory | SprayPath,
+    points_m: np.ndarray,
+    *,
+    surface: pd.Surface = PANEL,
+    name: str = 'panel',
+    texture: np.ndarray | float = 1.0,
+    **noise,
+) -> Experiment:
     """A panel that the model painted and a gauge measured, its film times a texture (N,)."""
     path = motion if isinstance(motion, SprayPath) else spray_path(motion)[0]
     integrator = FilmIntegrator(surface.at(points_m), model, 'double')
@@ -84,9 +90,11 @@ def painted_by(
 
 
 def gauged(
-    model: pd.DepositionModel, seed: int, columns: int = 3,
+    model: pd.DepositionModel,
+    seed: int,
+    columns: int = 3,
     orders: Sequence[Sequence[float]] = ORDERS[:1],
-) -> pd.Campaign:  # fmt: skip
+) -> pd.Campaign:
     """Panels painted by a model, two readings a point, with noise and texture as assumed.
 
     Args:

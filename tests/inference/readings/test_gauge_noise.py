@@ -86,12 +86,14 @@ def test_one_slip_does_not_raise_the_noise():
 @pytest.mark.parametrize(
     ('thickness', 'gross'),
     [
-        ([15.5, 26.4], [True, True]), ([26.6, 15.5, 26.1], [False, True, False]),
+        ([15.5, 26.4], [True, True]),
+        ([26.6, 15.5, 26.1], [False, True, False]),
         ([26.6, 15.5, 26.1, 40.0, 26.4], [False, True, False, True, False]),
-        ([10.0, 18.0, 26.0], [True, True, True]), ([15.5, 15.6, 26.1, 26.4], [True] * 4),
+        ([10.0, 18.0, 26.0], [True, True, True]),
+        ([15.5, 15.6, 26.1, 26.4], [True] * 4),
         ([25.6, 26.6, 27.0], [False] * 3),
     ],
-)  # fmt: skip
+)
 def test_the_minority_at_a_point_is_wrong(thickness, gross):
     labels, others = honest_pairs()
     # Nine pairs in ten without any scatter are no reason to doubt the tenth.
