@@ -294,8 +294,8 @@ class Improvement:
         ]  # fmt: skip
         if ends:
             found.append(
-                f'limited by the trigger window: {", ".join(ends)} at the end of it; allow more '
-                'with --trigger-shift or --trigger-cut'
+                f'the trigger window binds: {", ".join(ends)} at its end; allow more with '
+                '--trigger-shift or --trigger-cut'
             )
         found.append(
             'along this path, without limits and without weights for paint, time and smoothness, '
