@@ -139,7 +139,8 @@ def write_geometry_picture(
     key.legend(handles=lines, loc='upper left', frameon=False, fontsize=9, labelcolor=INK)
     text = '\n'.join(fill(f'warning: {line}', 48) for line in geometry.warnings)
     key.text(0.0, 0.0, text, fontsize=9, color=CHOSEN, transform=key.transAxes)
-    figure.suptitle(f'{title}\n{geometry.sentence}', x=0.02, ha='left', fontsize=11, color=INK)
+    words = f'{title}\n{fill(geometry.sentence, 105)}'
+    figure.suptitle(words, x=0.02, ha='left', fontsize=11, color=INK)
     return save_picture(figure, path)
 
 
