@@ -162,7 +162,7 @@ def test_inspect_says_and_draws_how_the_gun_ran_over_the_door(tmp_path):
     door, run, picture = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal', tmp_path / 'door.png'
     done = paint('inspect', '--mesh', door, '--trajectory', run, *TRIGGER, '--out', picture)
     assert (done.returncode, done.stderr) == (0, '')
-    assert done.stdout.startswith('3 passes, 0.30 m/s, TCP 250 mm from the surface')
+    assert done.stdout.startswith('3 passes, 0.30 m/s, TCP 249 mm from the surface')
     assert str(picture) in done.stdout
     with Image.open(picture) as image:
         assert min(image.size) > 1000
@@ -229,7 +229,7 @@ def test_a_campaign_says_how_each_part_was_painted_and_warns_of_odd_geometry(cam
     done = ran('compare', *campaign(shifted(0.3, 0.0, 0.0)), '-o', tmp_path / 'out')
     figures = json.loads((tmp_path / 'out/comparison.json').read_text())['geometry']['test panel']
     assert f'\ntest panel: {figures["sentence"]}' in done.stdout
-    assert figures['sentence'].startswith('3 passes, 0.40 m/s, TCP 0.2')
+    assert figures['sentence'].startswith('3 passes, 0.40 m/s, TCP 239 mm from the surface')
     assert 'warning: test panel: the passes lie 0.30 m aside' in done.stderr
     assert figures['warnings'][0] in done.stderr
 
