@@ -192,10 +192,17 @@ def test_where_the_user_places_a_part_goes_before_transforms(tree):
 
 def test_a_live_stream_that_begins_again_forgets_what_was_before():
     tree = FrameTree(live=True)
-    for start in (50 * STEP_NS, 0):
-        restarted = [tree.add('part', 'world', start + s, on_conveyor(s)) for s in (0, STEP_NS)]
-        assert restarted == [start == 0, False]
-    assert tree.stamps_ns('part') == [0, STEP_NS]
+    stamps = [50 * STEP_NS, 51 * STEP_NS, 0, STEP_NS, 2 * STEP_NS]
+    restarted = [tree.add('part', 'world', stamp, on_conveyor(stamp)) for stamp in stamps]
+    assert restarted == [False, False, False, True, False]
+    assert tree.stamps_ns('part') == stamps[2:]
+
+
+def test_one_late_transform_forgets_nothing():
+    tree = FrameTree(live=True)
+    stamps = [50 * STEP_NS, 51 * STEP_NS, 30 * STEP_NS, 52 * STEP_NS, 31 * STEP_NS]
+    assert not any(tree.add('part', 'world', stamp, on_conveyor(stamp)) for stamp in stamps)
+    assert tree.stamps_ns('part') == sorted(stamps)
 
 
 def test_a_part_that_is_handed_over_has_each_parent_at_its_time(tree):

@@ -36,8 +36,10 @@ class FrameTree:
         # Parent and pose of a frame that does not move; of these, where the user says that it is.
         self._fixed: dict[str, tuple[str, Rigid]] = {}
         self._placed: dict[str, tuple[str, Rigid]] = {}
-        # Stamp, parent and pose of each frame over time, in order.
+        # Stamp, parent and pose of each frame over time, in order; and of a live one that the
+        # last transform was far behind.
         self._moving: dict[str, list[tuple[int, str, np.ndarray]]] = {}
+        self._behind: dict[str, tuple[int, str, np.ndarray]] = {}
         # Transforms that hold at any time.
         self._lasting: dict[tuple[str, str], Rigid] = {}
 
@@ -69,21 +71,29 @@ class FrameTree:
         """
         if not self._has_room(child):
             return False
-        newest_ns = self.newest_ns(child)
-        # A live transform that is older than the newest by more is from a restarted stream [ns].
-        restarted = self._live and stamp_ns < newest_ns - 1_000_000_000
+        name, newest_ns = _name(child), self.newest_ns(child)
+        entry = stamp_ns, _name(parent), np.array(pose, dtype=float)
+        # A live transform that is older than the newest by more [ns] is late; two in a row are of
+        # a restarted stream.
+        is_behind = self._live and stamp_ns < newest_ns - 1_000_000_000
         # One without a stamp among those of a clock begins nothing.
         # Stamps from here on, of the year 2001, are of a clock and not of a simulation that began
         # at 0.
-        restarted &= stamp_ns > 0 or newest_ns < 1_000_000_000_000_000_000
-        if restarted:
+        is_behind &= stamp_ns > 0 or newest_ns < 1_000_000_000_000_000_000
+        before = self._behind.pop(name, None)
+        restarted = False
+        if is_behind and before is not None and before[0] < stamp_ns:
+            restarted = True
             self._moving.clear()
-        if _name(child) not in self._moving:
+            self._moving[name] = [before]
+        elif is_behind:
+            self._behind[name] = entry
+        if name not in self._moving:
             self._lasting.clear()
-        motion = self._moving.setdefault(_name(child), [])
+        motion = self._moving.setdefault(name, [])
         row = bisect_left(motion, stamp_ns, key=STAMP)
         is_known = row < len(motion) and motion[row][0] == stamp_ns
-        motion[row : row + is_known] = [(stamp_ns, _name(parent), np.array(pose, dtype=float))]
+        motion[row : row + is_known] = [entry]
         if self._live:
             # As in tf2 [ns], and no more poses than any cell has.
             old = bisect_left(motion, motion[-1][0] - 10_000_000_000, key=STAMP)
