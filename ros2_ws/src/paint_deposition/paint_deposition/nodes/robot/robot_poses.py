@@ -112,10 +112,13 @@ class TfPoses:
     def _take(self, message: Any, info: Mapping[str, Any]) -> None:
         """Take moving transforms, and look up the poses that all transforms are now known for."""
         for child, parent, stamp, pose in transforms_of(message):
+            stamps = [stamp]
             if self._tree.add(child, parent, stamp, pose):
+                # The first of the restarted stream could have been a late one.
+                stamps = self._tree.stamps_ns(child)
                 self._waiting.clear()
                 self._published_ns = 0
-            self._waiting.append((stamp, child))
+            self._waiting.extend((at_ns, child) for at_ns in stamps)
         moving = self._moving
         if not moving:
             return
