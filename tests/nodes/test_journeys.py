@@ -1,0 +1,81 @@
+"""The journeys that `docs/architecture.md` lists run through the files in the order it gives."""
+
+import re
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+import paint_deposition
+from cli.command import ran
+from nodes.cell import two_passes
+
+PACKAGE = Path(paint_deposition.__file__).parent
+SAMPLES = PACKAGE.parent / 'samples'
+DOOR = ('--mesh', SAMPLES / 'door.stl', '--trajectory', SAMPLES / 'door_horizontal')
+CAMPAIGN = SAMPLES / 'panel_study/campaign.yaml'
+
+
+@pytest.fixture
+def entered():
+    """Files of the package, in the order in which their functions are first called from now on."""
+    found: dict[str, None] = {}
+    package = f'{PACKAGE}/'
+
+    def note(frame, event, _argument):
+        file = frame.f_code.co_filename
+        if event != 'call' or not file.startswith(package):
+            return
+        name = file.removeprefix(package)
+        if name not in found and not is_importing(frame):
+            found[name] = None
+
+    threading.setprofile(note)
+    sys.setprofile(note)
+    yield found
+    sys.setprofile(None)
+    threading.setprofile(None)
+
+
+def is_importing(frame) -> bool:
+    """Whether the call is of what runs while a file is imported."""
+    while frame is not None and not frame.f_code.co_filename.startswith('<frozen importlib'):
+        frame = frame.f_back
+    return frame is not None
+
+
+def journey(repository: Path, name: str) -> list[str]:
+    page = (repository / 'docs/architecture.md').read_text(encoding='utf-8')
+    (row,) = re.findall(rf'^\| {re.escape(name)} \|(.*)\|$', page, re.MULTILINE)
+    return re.findall(r'`(\S+)`', row)
+
+
+def assert_passes(files: list[str], entered: dict[str, None]) -> None:
+    assert [file for file in entered if file in files] == files
+
+
+@pytest.mark.parametrize(
+    ('name', 'words'),
+    [
+        ('`paint simulate`', ('simulate', *DOOR)),
+        ('`paint improve`', ('improve', *DOOR)),
+        ('`paint diagnose`', ('diagnose', CAMPAIGN)),
+    ],
+)
+def test_a_command_passes_the_files_of_its_journey(name, words, entered, repository, tmp_path):
+    ran(*words, '-o', tmp_path / 'results')
+    assert_passes(journey(repository, name), entered)
+
+
+def test_a_pose_passes_the_files_of_its_journey(
+    entered, simulator, robot, wait_until, repository
+):
+    node = simulator()
+    entered.clear()
+    robot(node).send(two_passes())
+    wait_until(lambda: 'kernel/eq2_flux.py' in entered, what='painting')
+    # The display looks for a new film all the time.
+    entered.pop('nodes/painting/film_display.py', None)
+    wait_until(lambda: 'nodes/painting/film_display.py' in entered, what='the display')
+    assert_passes(journey(repository, 'a live pose'), entered)
