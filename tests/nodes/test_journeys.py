@@ -68,9 +68,7 @@ def test_a_command_passes_the_files_of_its_journey(name, words, entered, reposit
     assert_passes(journey(repository, name), entered)
 
 
-def test_a_pose_passes_the_files_of_its_journey(
-    entered, simulator, robot, wait_until, repository
-):
+def test_a_pose_passes_the_files_of_its_journey(entered, simulator, robot, wait_until, repository):
     node = simulator()
     entered.clear()
     robot(node).send(two_passes())

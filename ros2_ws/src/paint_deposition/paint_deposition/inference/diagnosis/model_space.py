@@ -132,10 +132,11 @@ def log_share(explanation: Explanation) -> float:
 
 
 class WeightedNull(NamedTuple):
-    """Sizes of the discrepancy, the null model with it, and the logarithm of its weight."""
+    """Sizes of the discrepancy, the null model with it, its log prior and log weight."""
 
     sizes: DiscrepancyHyperparameters
     null: NullModel
+    log_prior: float
     log_weight: float
 
     @staticmethod
@@ -152,16 +153,12 @@ class WeightedNull(NamedTuple):
         prior = sizes.log_prior + float(np.log(share))
         if sizes.is_beyond_nature:
             prior += LOG_ODDS_UNKNOWN
-        return WeightedNull(sizes, null, evidence + prior)
+        return WeightedNull(sizes, null, prior, evidence + prior)
 
     def log_weight_of(self, rows: np.ndarray, freedom: float) -> float:
         """Logarithm of the weight by some readings (P,) only."""
         some = self.null.select(rows)
-        with_all, with_some = (
-            float(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
-            for null in (self.null, some)
-        )
-        return self.log_weight - with_all + with_some
+        return self.log_prior + float(some.log_evidence(some.deviation[:, np.newaxis], freedom)[0])
 
 
 class ModelSpace:
@@ -267,9 +264,7 @@ class ModelSpace:
 
     def _log_weight(self, one: WeightedNull, deviations: np.ndarray) -> np.ndarray:
         """(D,) what the weight of one choice of sizes would be for whitened deviations (P, D)."""
-        here, there = one.null.deviation[:, np.newaxis], deviations
-        change = one.null.log_evidence(there, self.freedom)
-        return one.log_weight + change - one.null.log_evidence(here, self.freedom)
+        return one.log_prior + one.null.log_evidence(deviations, self.freedom)
 
     @property
     def figures(self) -> DiscrepancyFigures:

@@ -158,8 +158,7 @@ class Calibration:
     @property
     def chi_square_per_freedom(self) -> float:
         """About 1 where only the gauge's noise is left."""
-        freedom = max(len(self.study) - len(self.fit.vector), 1)
-        return self.fit.marginal.chi_square / freedom
+        return self.fit.marginal.chi_square_per_freedom
 
 
 @on_one_thread
@@ -265,7 +264,7 @@ def _warnings(
         for pair in pairs
         if abs(pair.value) > 0.95
     ]
-    squares = fit.marginal.chi_square / max(len(study) - len(fit.vector), 1)
+    squares = fit.marginal.chi_square_per_freedom
     # Above this the gauge's noise does not explain the residuals.
     if squares > 2.0:
         warnings.append(

@@ -85,9 +85,7 @@ def scaled_covariance(fit: Fit, shifts: np.ndarray | None = None) -> np.ndarray:
     ``shifts`` (n, k) of the vector, each as likely as not, are added as further standard
     deviations of their own directions.
     """
-    freedom = max(len(fit.residual) - len(fit.vector), 1)
-    widening = max(fit.chi_square / freedom, 1.0)
-    data = fit.jacobian.T @ fit.jacobian / widening
+    data = fit.jacobian.T @ fit.jacobian / max(fit.chi_square_per_freedom, 1.0)
     covariance = np.linalg.inv(data + fit.parameters.prior.precision)
     return covariance if shifts is None else covariance + shifts.T @ shifts
 

@@ -74,6 +74,11 @@ class Fit:
         return float(self.residual @ self.residual)
 
     @property
+    def chi_square_per_freedom(self) -> float:
+        """About 1 where only noise is left."""
+        return self.chi_square / max(len(self.residual) - len(self.vector), 1)
+
+    @property
     def objective(self) -> float:
         """What the fit minimises: chi-square, nuisance integrated out, and that of the prior."""
         away = self.parameters.prior.whiten(self.vector)

@@ -107,19 +107,13 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         return self._transition_result('activated', lambda: self._enter(self._activate))
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result(
-            'deactivated', lambda: self._leave_if_idle(self._deactivate)
-        )
+        return self._transition_result('deactivated', lambda: self._leave(self._deactivate), True)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('cleaned up', lambda: self._leave_if_idle(self._cleanup))
+        return self._transition_result('cleaned up', lambda: self._leave(self._cleanup), True)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        def shut_down() -> None:
-            self._require_idle()
-            self.close()
-
-        return self._transition_result('shut down', shut_down)
+        return self._transition_result('shut down', self.close, True)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.close()
@@ -129,15 +123,13 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         self._load()
         self.tasks = {**self._configure(), 'state': self._state_status}
 
-    def _require_idle(self) -> None:
-        if self.awaiting:
-            raise PaintError('a request is under way: call again after it')
-
     def _transition_result(
-        self, done: str, transition: Callable[[], None]
+        self, done: str, transition: Callable[[], None], needs_rest: bool = False
     ) -> TransitionCallbackReturn:
         self._failure = None
         try:
+            if needs_rest and self.awaiting:
+                raise PaintError('a request is under way: call again after it')
             transition()
         except Exception as error:
             self._failure = error
@@ -161,10 +153,6 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
             self._destroy(self._entities - before)
             raise
         self._created[-1] = self._entities - before
-
-    def _leave_if_idle(self, step: Callable[[], None]) -> None:
-        self._require_idle()
-        self._leave(step)
 
     def _leave(self, step: Callable[[], None]) -> None:
         stays = False
