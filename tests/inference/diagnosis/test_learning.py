@@ -88,6 +88,9 @@ def test_what_no_law_explains_is_learned_without_the_parts_left_out():
     assert len(with_laws) == learning.MOST_LAWS
     # No second law is learned over one covariate, and none over one that is left out.
     assert with_laws[1] == with_laws[0]
+    law = [(over_time[0], 1.0)]
+    assert left_out.borne_out(law) == 1
+    assert left_out.error_um(law) == pytest.approx(with_laws[0])
     kept_out = left_out.errors_um(frozenset(['time_s']))
     assert kept_out == pytest.approx([without] * (1 + learning.MOST_LAWS))
     anew = []
@@ -96,6 +99,25 @@ def test_what_no_law_explains_is_learned_without_the_parts_left_out():
         learned = refit(others, BASE, LEARNED['time_s']).model
         anew.append(compare(Study.of(pd.Campaign((part,))), learned).points.residual_um)
     assert with_laws[0] == pytest.approx(root_mean_square(np.concatenate(anew)), rel=0.15)
+
+
+@pytest.mark.slow
+def test_a_law_that_improves_one_part_only_is_not_chosen_by_that_part():
+    """The error of each part is that of as many laws as the other parts bear out."""
+    first, *others = gauged(BASE, seed=0, orders=THREE).experiments
+    nothing = Search(begun(pd.Campaign((first, *others)))).nothing
+    study = nothing.state.study
+    films_um = study.measured_um - np.array([[1.0], [1.02]])
+    films_um[1, study.folds() == 0] += 0.9
+
+    class Given(learning.LeftOut):
+        def errors_um(self, without=frozenset(), patches=False, rows=slice(None)):
+            return np.sqrt(np.mean((study.measured_um - films_um)[:, rows] ** 2, axis=1))
+
+    given, law = Given([SearchStage(nothing, [])], nothing, []), [(WAVY, 1.0)]
+    assert given.errors_um()[1] < 0.9
+    assert given.borne_out(law) == 1
+    assert given.error_um(law) == pytest.approx(np.sqrt((1.0 + 2.0 * 1.02**2) / 3.0))
 
 
 @pytest.mark.slow

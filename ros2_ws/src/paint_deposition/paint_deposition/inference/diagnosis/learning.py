@@ -29,6 +29,10 @@ from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
 
 MOST_LAWS = 2
+# Share by which a law must lower the error on readings left out.
+LEAST_GAIN = 0.02
+# A law that was chosen, and the size of its amplitudes.
+Sized = tuple[Explanation, float]
 
 
 @dataclass(frozen=True)
@@ -136,26 +140,63 @@ class LeftOut:
         self, stages: Sequence[SearchStage], final: EffectSet, options: Sequence[Explanation]
     ) -> None:
         self.stages, self.final, self.options = stages, final, options
+        self.study = final.state.study
         self._known: dict[tuple[frozenset[str], bool], np.ndarray] = {}
 
     def errors_um(
-        self, without: frozenset[str] = frozenset(), patches: bool = False
+        self,
+        without: frozenset[str] = frozenset(),
+        patches: bool = False,
+        rows: np.ndarray | slice = slice(None),
     ) -> np.ndarray:
         """(n,) with effects and 0 to n - 1 laws, all found without what is left out [um].
 
         Args:
             without: covariates of laws that are not learned.
             patches: leave out patches of parts, even where there are several parts.
+            rows: of the readings (P,) whose errors count.
         """
         key = without, patches
         if key not in self._known:
-            study = self.stages[0].here.state.study
-            self._known[key] = study.errors_left_out_um(partial(self._predicted, without), patches)
-        return self._known[key]
+            predict = partial(self._predicted, without)
+            self._known[key] = self.study.squares_left_out_um2(predict, patches)
+        return np.sqrt(np.mean(self._known[key][:, rows], axis=1))
+
+    def borne_out(
+        self,
+        laws: Sequence[Sized],
+        without: frozenset[str] = frozenset(),
+        rows: np.ndarray | slice = slice(None),
+    ) -> int:
+        """How many of some laws, from the first one on, the readings left out bear out.
+
+        A curve must predict whole parts better; a map or a footprint these, or patches of the
+        parts without predicting whole parts worse.
+        """
+        kept, enough = 0, 1.0 - LEAST_GAIN
+        parts_um = self.errors_um(without, rows=rows)
+        for count, (law, _) in enumerate(laws, start=1):
+            better = parts_um[count] <= enough * parts_um[kept]
+            if law.learns in (PLACE, FOOTPRINT) and parts_um[count] <= 1.001 * parts_um[kept]:
+                patches_um = self.errors_um(without, patches=True, rows=rows)
+                better |= patches_um[count] <= enough * patches_um[kept]
+            if better:
+                kept = count
+        return kept
+
+    def error_um(self, laws: Sequence[Sized], without: frozenset[str] = frozenset()) -> float:
+        """With as many of some laws on each part left out as the other parts bear out [um]."""
+        folds = self.study.folds()
+        squares_um2 = 0.0
+        for fold in np.unique(folds):
+            out = folds == fold
+            count = self.borne_out(laws, without, ~out)
+            squares_um2 += float(self.errors_um(without, rows=out)[count]) ** 2 * out.sum()
+        return float(np.sqrt(squares_um2 / len(self.study)))
 
     def _predicted(self, without: frozenset[str], out: np.ndarray) -> np.ndarray:
         """(n, P) films with 0 to n - 1 laws, found without some readings (P,) [um]."""
-        state = self.stages[0].here.state
+        study, freedom = self.study, self.final.state.freedom
         options = [option for option in self.options if option.learns not in without]
         followers = [*(stage.here for stage in self.stages[1:]), self.stages[-1].here]
         for stage, follower in zip(self.stages, followers, strict=True):
@@ -165,12 +206,12 @@ class LeftOut:
         else:
             found = self.final
         nulls = NullModels.around(found, found.fit).select(~out)
-        laws = choose_laws(nulls, [option.select(~out) for option in options], state.freedom)
+        laws = choose_laws(nulls, [option.select(~out) for option in options], freedom)
         learned = [size * options[k].columns for k, size in laws]
-        films_um = [state.study.predicted_without_um(found.fit, out)]
+        films_um = [study.predicted_without_um(found.fit, out)]
         for count in range(1, len(learned) + 1):
             free = np.hstack(learned[:count])
-            films_um.append(state.study.predicted_without_um(found.fit, out, free))
+            films_um.append(study.predicted_without_um(found.fit, out, free))
         return np.array(films_um + films_um[-1:] * (MOST_LAWS - len(learned)))
 
 

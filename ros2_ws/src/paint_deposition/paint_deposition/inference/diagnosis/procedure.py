@@ -18,9 +18,6 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.explanations import (
-    FOOTPRINT,
-    PLACE,
-    Explanation,
     nonparametric_laws_of,
     of_corrections,
     of_footprint,
@@ -46,8 +43,6 @@ ALPHA = 0.05
 # The model is not good enough where it misses the readings, beyond gauge and texture, by this part
 # of the thickest film: measured sprays of one setting differ by 0.5 to 5 %.
 MOST_BEYOND = 0.03
-# Share by which a learned curve must lower the error on readings left out.
-LEAST_GAIN = 0.02
 
 
 @on_one_thread
@@ -159,7 +154,7 @@ def _learn(state: DiagnosisState, best: EffectSet, left_out: LeftOut) -> Diagnos
     while True:
         left = [option for option in left_out.options if option.learns not in without]
         laws = [(left[k], size) for k, size in choose_laws(nulls, left, state.freedom)]
-        chosen = _predicting(laws, left_out, without)
+        chosen = laws[: left_out.borne_out(laws, without)]
         if not chosen:
             return state
         fit = state.learned(chosen)
@@ -173,31 +168,11 @@ def _learn(state: DiagnosisState, best: EffectSet, left_out: LeftOut) -> Diagnos
     learned = [
         e.id for e in fit.model.effects if e.family == 'learned' and e not in state.start.effects
     ]
-    before, error_um = state.history[-1], left_out.errors_um(without)[len(chosen)]
-    state = state.with_step(' and '.join(learned), fit, float(error_um))
+    before, error_um = state.history[-1], left_out.error_um(laws, without)
+    state = state.with_step(' and '.join(learned), fit, error_um)
     for law in learned:
         state = state.accepting((law,), 1.0, before)
     return state
-
-
-def _predicting(
-    laws: list[tuple[Explanation, float]], left_out: LeftOut, without: frozenset[str]
-) -> list[tuple[Explanation, float]]:
-    """The first of some laws, as far as readings left out bear them out.
-
-    A curve must predict whole parts better; a map or a footprint these, or patches of the parts
-    without predicting whole parts worse.
-    """
-    kept, enough = 0, 1.0 - LEAST_GAIN
-    for count, (law, _) in enumerate(laws, start=1):
-        parts_um = left_out.errors_um(without)
-        better = parts_um[count] <= enough * parts_um[kept]
-        if law.learns in (PLACE, FOOTPRINT) and parts_um[count] <= 1.001 * parts_um[kept]:
-            patches_um = left_out.errors_um(without, patches=True)
-            better |= patches_um[count] <= enough * patches_um[kept]
-        if better:
-            kept = count
-    return laws[:kept]
 
 
 def _conclude(

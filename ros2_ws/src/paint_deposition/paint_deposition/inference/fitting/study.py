@@ -248,10 +248,17 @@ class Study:
         amounts = found.amplitudes[0][:count]
         return found.predicted_um + self.sigma_um * (own @ amounts)
 
-    def errors_left_out_um(
+    def errors_left_out_um(self, predict: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """(...) root mean square errors on parts that are left out in turn [um].
+
+        Args: see ``squares_left_out_um2``.
+        """
+        return np.sqrt(np.mean(self.squares_left_out_um2(predict), axis=-1))
+
+    def squares_left_out_um2(
         self, predict: Callable[[np.ndarray], np.ndarray], patches: bool = False
     ) -> np.ndarray:
-        """(...) root mean square errors on parts that are left out in turn [um].
+        """(..., P) squared errors at the points of parts that are left out in turn [um2].
 
         Levels of which the other parts say nothing are estimated from the part's own readings, as
         in ``residuals``: see ``levels_untold``.
@@ -262,18 +269,19 @@ class Study:
             patches: leave out patches of parts, even where there are several parts.
         """
         folds = self.patches() if patches else self.folds()
-        squares_um2: np.ndarray | float = 0.0
+        found = []
         for fold in np.unique(folds):
             out = folds == fold
-            films_um = predict(out)
-            squares_um2 = squares_um2 + np.apply_along_axis(self._square_um2, -1, films_um, out)
-        return np.sqrt(squares_um2 / len(self))
+            found.append(np.apply_along_axis(self._errors_um, -1, predict(out), out))
+        return np.sum(found, axis=0) ** 2
 
-    def _square_um2(self, film_um: np.ndarray, out: np.ndarray) -> float:
-        """Sum of squared errors of a film (P,) on points left out (P,), beside levels untold."""
+    def _errors_um(self, film_um: np.ndarray, out: np.ndarray) -> np.ndarray:
+        """(P,) errors of a film (P,) on points left out, beside levels untold; 0 elsewhere."""
         levels = levels_untold(self.campaign, film_um, self.sigma_um, ~out)[out]
+        errors_um = np.zeros(len(self))
         misfit = ((self.measured_um - film_um) / self.sigma_um)[out]
-        return float(np.sum((self.sigma_um[out] * _beside(levels, misfit)) ** 2))
+        errors_um[out] = self.sigma_um[out] * _beside(levels, misfit)
+        return errors_um
 
     @property
     def _facet_notes(self) -> tuple[str, ...]:
