@@ -156,15 +156,17 @@ def test_a_thick_film_without_texture_is_no_broken_fit():
         pd.Campaign((even.with_readings(stated),)), MODEL, starts=1
     )
     assert trouble_with(study, fit) == ''
-    assert study.texture.source == 'neighbours'
-    assert study.texture.share < 0.004
-    assert study.notes == (str(study.texture),)
+    assert study.estimated_texture < 0.004
+    assert study.noise_figures['texture_source'] == 'neighbours'
+    (note,) = study.notes
+    assert note.startswith("The film's own texture is 0.")
 
 
 def test_an_assumed_noise_leaves_the_texture_assumed():
     experiment = painted_by(MODEL, passes([0.55, 1.35]), grid_m(), repeats=1)
     study, _ = cleaning.clean_and_fit(pd.Campaign((experiment,)), MODEL, starts=1)
-    assert (study.texture.share, study.texture.source) == (0.01, 'assumed')
+    assert study.texture_share == 0.01
+    assert study.noise_figures['texture_source'] == 'assumed'
 
 
 NOISE_UM, SCANNED = 0.4, 6000

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from paint_deposition.inference.fitting.panel import CollapseFit, Panel, fit_collapse
+from paint_deposition.inference.fitting.panel import Panel, PanelFit, fit_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
 from paint_deposition.part.points import SurfacePoints
@@ -27,7 +27,7 @@ def table(path: Path) -> np.ndarray:
     return np.loadtxt(path, delimiter=',', skiprows=1).T
 
 
-def fitted_transect(station_ft: np.ndarray, depth_in: np.ndarray) -> CollapseFit:
+def fitted_transect(station_ft: np.ndarray, depth_in: np.ndarray) -> PanelFit:
     """Eq. (3) fitted to a pass; feet and inches take the places of metres and micrometres."""
     one_pass = Panel(station_ft, np.zeros(1), np.ones(1), np.zeros(1, dtype=bool), 1.0, 0.0)
     return fit_collapse(one_pass, depth_in, np.full(len(depth_in), 0.05))

@@ -10,7 +10,7 @@ import re
 import sys
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -190,16 +190,19 @@ def _sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def filled(template: Path, **values: Any) -> str:
-    """A text file by its Jinja template, from these values as they are; each must be there."""
-    from jinja2 import StrictUndefined, Template
+def filled(
+    template: Path, filters: Mapping[str, Callable[..., Any]] | None = None, **values: Any
+) -> str:
+    """A file by its Jinja template, from these values; each must be there. HTML is escaped."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    text = template.read_text(encoding='utf-8')
-    made = Template(
-        text, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+    environment = Environment(
+        loader=FileSystemLoader(template.parent), autoescape='.html' in template.suffixes,
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True,
     )  # fmt: skip
-    return made.render(values)
+    environment.filters.update(filters or {})
+    return environment.get_template(template.name).render(values)
 
 
 def write_parquet(path: Path, table: pa.Table) -> Path:

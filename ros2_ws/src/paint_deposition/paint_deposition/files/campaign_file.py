@@ -215,12 +215,13 @@ def _read_experiments(
             of_layer = replace(of_layer, thickness_um=film_um, understood=understood)
         if coats.names != ('',):
             of_layer = replace(of_layer, layer=np.array(layer))
+        band = (entry.target_um or 0.0, entry.tolerance_um or 0.0)
         experiment = Experiment.of(
             f'{name}: {layer}' if entry.coats and (layer != TOTAL or not rows.all()) else name,
-            surface, path, of_layer, files, settings, off, trajectories[0].frame_id, films,
+            surface, path, of_layer, files=files, settings=settings, switched_off=off,
+            frame_id=trajectories[0].frame_id, films=films, layer=layer,
+            target=band if band[0] else None,
         )  # fmt: skip
-        band = (entry.target_um or 0.0, entry.tolerance_um or 0.0)
-        experiment = replace(experiment, layer=layer, target=band if band[0] else None)
         if zones and layer == TOTAL:  # what is wanted is the whole film
             of_part = read_zones(zones, files['mesh'], entry.mesh_scale, entry.body)
             its_files = experiment.files | {'zones': str(zones)}

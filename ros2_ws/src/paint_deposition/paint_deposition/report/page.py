@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from scipy.special import fdtrc
 
 from paint_deposition import __version__, git_version
-from paint_deposition.files.atomic import plain, write_text
+from paint_deposition.files.atomic import filled, plain, write_text
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import CPK_MEANS, film_statistics
 from paint_deposition.inference.comparison.comparison import SideBySide
@@ -209,15 +209,8 @@ def point_rows(data: ReportData) -> list[dict[str, Any]]:
 
 def _filled(name: str, **given: Any) -> str:
     """A page from its template, in the style that all pages share."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    environment.filters.update(FILTERS)
     style = (TEMPLATES / 'report.css').read_text(encoding='utf-8')
-    return environment.get_template(name).render(style=style, **given)
+    return filled(TEMPLATES / name, FILTERS, style=style, **given)
 
 
 def _embedded(figure: Figure) -> str:

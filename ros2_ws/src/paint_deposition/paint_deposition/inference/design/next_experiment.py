@@ -150,8 +150,8 @@ def _tried(
 
 def _together(study: Study, experiments: Sequence[Experiment]) -> Study:
     """The study with the readings of these experiments, noise and texture as they are."""
-    campaign = Campaign(tuple(experiments))
-    return replace(Study.of(campaign, study.forward.effects), texture=study.texture)
+    together = Study.of(Campaign(tuple(experiments)), study.forward.effects)
+    return replace(together, estimated_texture=study.estimated_texture)
 
 
 def _in_words(

@@ -19,7 +19,6 @@ from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.film.statistics import efficiency, impossible_brushes
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import (
-    Correlation,
     DiscrepancyFigures,
     Estimate,
     correlations,
@@ -27,8 +26,8 @@ from paint_deposition.inference.fitting.estimates import (
 )
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
 from paint_deposition.inference.fitting.panel import (
-    CollapseFit,
     Panel,
+    PanelFit,
     check_panel,
     fit_collapse,
     shifts,
@@ -46,30 +45,9 @@ from paint_deposition.inference.readings.plausibility import (
     geometry_by_experiment,
 )
 from paint_deposition.inference.readings.readings import Residuals
-from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
 # Residuals beyond this many standard deviations are named in a warning.
 OUTLIER_SIGMAS = 4.0
-
-
-@dataclass(frozen=True)
-class PanelFit:
-    """A panel's one-dimensional fit: where its points lie, and eq. (3)."""
-
-    panel: Panel
-    collapse: CollapseFit
-
-    def to_dict(self) -> dict[str, Any]:
-        """Eq. (3), and eq. (5) for it at the panel's own index if it has one."""
-        collapse = self.collapse.collapse
-        index = self.panel.scale_m if len(self.panel.passes_m) > 1 else None
-        return {
-            **collapse.model_dump(),
-            'index_m': index,
-            'sigma_n': index and ParallelPasses.one_way(collapse).sigma_n(index),
-            'rmse_um': self.collapse.residuals.rmse_um,
-            'speed_m_per_s': float(self.panel.speed_m_per_s[0]),
-        }
 
 
 @dataclass(frozen=True)
@@ -90,7 +68,7 @@ class Calibration:
     study: Study
     fit: Fit
     parameters: tuple[Estimate, ...]
-    correlations: tuple[Correlation, ...]
+    correlations: dict[tuple[str, str], float]
     residuals: tuple[Residuals, ...]
     panels: tuple[PanelFit | None, ...]
     warnings: tuple[str, ...]
@@ -113,8 +91,8 @@ class Calibration:
                 for value in self.parameters
             },
             'correlations': [
-                {'parameters': [pair.first, pair.second], 'value': pair.value}
-                for pair in self.correlations[:10]
+                {'parameters': list(pair), 'value': value}
+                for pair, value in [*self.correlations.items()][:10]
             ],
             'experiments': [
                 {
@@ -224,9 +202,9 @@ def _panel_fit(study: Study, number: int) -> PanelFit | None:
     rows = study.campaign.experiment_of == number
     measured, sigma = study.measured_um[rows], study.sigma_um[rows]
     check_panel(experiment.readings, panel, measured, sigma)
-    collapse = fit_collapse(panel, measured, sigma)
-    check_units_against_fit(experiment.readings, measured, collapse.residuals.predicted_um)
-    return PanelFit(panel, collapse)
+    fitted = fit_collapse(panel, measured, sigma)
+    check_units_against_fit(experiment.readings, measured, fitted.residuals.predicted_um)
+    return fitted
 
 
 def _guessed(model: DepositionModel, panels: Sequence[PanelFit]) -> DepositionModel:
@@ -238,7 +216,7 @@ def _guessed(model: DepositionModel, panels: Sequence[PanelFit]) -> DepositionMo
     """
     patterns, projection = list(model.patterns), model.projection
     for fitted in reversed(panels):
-        panel, collapse = fitted.panel, fitted.collapse.collapse
+        panel, collapse = fitted.panel, fitted.collapse
         shrink = projection.model_plane_m / (panel.distance_m + projection.emission_offset_m)
         sigma = float(np.clip(collapse.sigmas_m.max() * shrink, 0.01, 0.8))
         r = float(np.clip(max(collapse.r1_m, collapse.r2_m) * shrink, 0.0, 0.9))
@@ -249,7 +227,7 @@ def _guessed(model: DepositionModel, panels: Sequence[PanelFit]) -> DepositionMo
 
 
 def _warnings(
-    study: Study, fit: Fit, values: tuple[Estimate, ...], pairs: tuple[Correlation, ...]
+    study: Study, fit: Fit, values: tuple[Estimate, ...], pairs: dict[tuple[str, str], float]
 ) -> list[str]:
     warnings = list(study.left_out)
     warnings += [] if fit.converged else ['the fit did not converge: its values are not final']
@@ -259,10 +237,10 @@ def _warnings(
         if not value.determined
     ]
     warnings += [
-        f'{pair.first} and {pair.second} can hardly be separated (correlation '
-        f'{pair.value:+.2f}): trust their combination, not each'
-        for pair in pairs
-        if abs(pair.value) > 0.95
+        f'{first} and {second} can hardly be separated (correlation {value:+.2f}): trust their '
+        'combination, not each'
+        for (first, second), value in pairs.items()
+        if abs(value) > 0.95
     ]
     squares = fit.marginal.chi_square_per_freedom
     # Above this the gauge's noise does not explain the residuals.

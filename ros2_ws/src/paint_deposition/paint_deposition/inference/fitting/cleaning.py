@@ -26,7 +26,7 @@ from paint_deposition.inference.fitting.outliers import (
     find_outliers,
 )
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study, Texture
+from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
@@ -84,7 +84,7 @@ def _cleaned(
     if study.noise.source != 'assumed':
         share = misfit.leave_one_out.texture_share
         if share < TEXTURE_SHARE:
-            study = replace(study, texture=Texture(share, 'neighbours'))
+            study = replace(study, estimated_texture=share)
             fit = _fitted(study, fit.model, 1, seed, known)
     faceted = study.with_facets(fit.model)
     if faceted is not study:

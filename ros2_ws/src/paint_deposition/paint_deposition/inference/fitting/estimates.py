@@ -26,15 +26,6 @@ class Estimate:
     reason: str = ''  # if not, why
 
 
-@dataclass(frozen=True)
-class Correlation:
-    """Correlation of two estimates."""
-
-    first: str
-    second: str
-    value: float
-
-
 def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...]:
     """Every varied parameter with its uncertainty.
 
@@ -63,20 +54,20 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
     return tuple(found)
 
 
-def correlations(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Correlation, ...]:
+def correlations(fit: Fit, shifts: np.ndarray | None = None) -> dict[tuple[str, str], float]:
     """Correlations of all pairs of parameters, strongest first."""
     spread = _spread(fit, scaled_covariance(fit, shifts))
     sigma = np.sqrt(np.diag(spread))
     matrix = spread / np.outer(sigma, sigma)
     names = _names(fit)
-    pairs = [
-        Correlation(names[i], names[j], float(matrix[i, j]))
+    pairs = {
+        (names[i], names[j]): float(matrix[i, j])
         for i in range(len(names))
         for j in range(i)
         # Brushes share their phase.
         if not names[i].endswith('phi_rad') or not names[j].endswith('phi_rad')
-    ]
-    return tuple(sorted(pairs, key=lambda pair: -abs(pair.value)))
+    }
+    return dict(sorted(pairs.items(), key=lambda item: -abs(item[1])))
 
 
 def scaled_covariance(fit: Fit, shifts: np.ndarray | None = None) -> np.ndarray:

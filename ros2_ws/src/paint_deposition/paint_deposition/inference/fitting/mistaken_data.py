@@ -81,7 +81,8 @@ class Weighed:
     def meant(self, way: Meant) -> 'Weighed':
         """The readings as meant, fitted from the model at hand."""
         fit, like = self.fit, self.study
-        study = replace(Study.of(way.campaign, like.forward.effects), texture=like.texture)
+        study = Study.of(way.campaign, like.forward.effects)
+        study = replace(study, estimated_texture=like.estimated_texture)
         if like.facet_um is not None:
             study = study.with_facets(fit.model)
         known = fit.parameters.known if way.of_this_gun else None

@@ -8,6 +8,7 @@ wide, which its intervals do not show.
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -23,6 +24,7 @@ from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.plausibility import FEWEST_POINTS
 from paint_deposition.inference.readings.readings import Readings, Residuals
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 
@@ -139,15 +141,26 @@ def check_panel(
 
 
 @dataclass(frozen=True)
-class CollapseFit:
-    """The three Gaussians of a pass."""
+class PanelFit:
+    """The one-dimensional fit of a panel."""
 
-    # Eq. (3) for the first pass's speed.
-    collapse: ThreeGaussianCollapse
+    panel: Panel  # where its points lie
+    collapse: ThreeGaussianCollapse  # eq. (3) for the first pass's speed
     residuals: Residuals  # of the P points, with the film of all passes as the prediction
 
+    def to_dict(self) -> dict[str, Any]:
+        """Eq. (3), and eq. (5) for it at the panel's own index if it has one."""
+        index = self.panel.scale_m if len(self.panel.passes_m) > 1 else None
+        return {
+            **self.collapse.model_dump(),
+            'index_m': index,
+            'sigma_n': index and ParallelPasses.one_way(self.collapse).sigma_n(index),
+            'rmse_um': self.residuals.rmse_um,
+            'speed_m_per_s': float(self.panel.speed_m_per_s[0]),
+        }
 
-def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) -> CollapseFit:
+
+def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) -> PanelFit:
     """Fit eq. (3), summed over the passes, with a loss that is robust against gross errors.
 
     Args:
@@ -186,7 +199,7 @@ def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) ->
         r1_m=best[3] * scale, r2_m=best[4] * scale,
         sigma1_m=sigma[0], sigma2_m=sigma[1], sigma3_m=sigma[2],
     )  # fmt: skip
-    return CollapseFit(collapse, Residuals(measured_um, film(best), sigma_um))
+    return PanelFit(panel, collapse, Residuals(measured_um, film(best), sigma_um))
 
 
 # Readings reach an edge of the pattern beyond which no more of a pass's paint lands than this.

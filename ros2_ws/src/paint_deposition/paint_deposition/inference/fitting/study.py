@@ -28,26 +28,9 @@ from paint_deposition.inference.readings.readings import Residuals, root_mean_sq
 
 # Times that points are left out for cross-validation, each of them once.
 FOLDS = 6
-# Texture that is assumed where the readings do not show it.
+# The film's own variation from spot to spot, which no model predicts and repeats do not average
+# out, as a standard deviation over the film: assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
-
-
-@dataclass(frozen=True)
-class Texture:
-    """The film's own variation from spot to spot, which no model predicts.
-
-    Repeats at one spot do not average it out, and it is no error of the gauge.
-    """
-
-    share: float = TEXTURE_SHARE  # standard deviation as a share of the film
-    # 'neighbours' if estimated from readings near each other, else 'assumed'.
-    source: str = 'assumed'
-
-    def __str__(self) -> str:
-        share = f'{100.0 * self.share:.2g} % of the film'
-        if self.source == 'assumed':
-            return f"The film's own texture was assumed to be {share}."
-        return f"The film's own texture is {share}, estimated from neighbouring readings."
 
 
 @dataclass(frozen=True)
@@ -65,7 +48,8 @@ class Study:
     campaign: Campaign  # the experiments
     forward: Forward  # predicts the P points
     noise: GaugeNoise  # of single readings
-    texture: Texture = Texture()  # of the film
+    # Of the film, as estimated from readings near each other; None: assumed.
+    estimated_texture: float | None = None
     outliers: tuple[Outlier, ...] = ()  # single readings that were left out, see ``clean_and_fit``
     mistakes: tuple[Mistake, ...] = ()  # what is simply wrong with the data, found there, too
     # (P,) film that the facets of curved meshes cost, see ``with_facets`` [um].
@@ -100,10 +84,15 @@ class Study:
         return np.hypot(self.gauge_um, self.texture_um)
 
     @property
+    def texture_share(self) -> float:
+        """Texture over the film, as a standard deviation."""
+        return self.estimated_texture or TEXTURE_SHARE
+
+    @property
     def texture_um(self) -> np.ndarray:
         """(P,) the same without the gauge's, which repeats do not average out [um]."""
         facets_um = 0.0 if self.facet_um is None else self.facet_um
-        return np.hypot(self.texture.share * self.measured_um, facets_um)
+        return np.hypot(self.texture_share * self.measured_um, facets_um)
 
     def with_facets(self, model: DepositionModel) -> 'Study':
         """The study with what facets cost under a model, if it shows beside the noise."""
@@ -173,7 +162,11 @@ class Study:
             'The noise of the gauge was assumed (0.7 µm and 1 %); take 6 or more second readings, '
             'on a display that shows how they differ, for p-values that can be trusted.'
         ]  # fmt: skip
-        notes += [] if self.texture.source == 'assumed' else [str(self.texture)]
+        if self.estimated_texture:
+            share = f'{100.0 * self.estimated_texture:.2g} % of the film'
+            notes.append(
+                f"The film's own texture is {share}, estimated from neighbouring readings."
+            )
         if scan := self.campaign.scan:
             notes.append(
                 f'{len(scan.readings)} readings were condensed to the means of {len(self)} '
@@ -205,8 +198,8 @@ class Study:
         return {
             'sigma_um': self.noise.typical_um,
             'source': self.noise.source,
-            'texture_share': self.texture.share,
-            'texture_source': self.texture.source,
+            'texture_share': self.texture_share,
+            'texture_source': 'neighbours' if self.estimated_texture else 'assumed',
         }
 
     @property

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -52,12 +53,11 @@ class Experiment:
 
     @staticmethod
     def of(
-        name: str, surface: Surface, path: SprayPath, readings: Readings,
-        files: dict[str, str] | None = None, settings: Mapping[str, float] | None = None,
-        switched_off: frozenset[str] = frozenset(), frame_id: str = '',
-        films: WetFilms = ONE_FILM,
-    ) -> 'Experiment':  # fmt: skip
+        name: str, surface: Surface, path: SprayPath, readings: Readings, **known: Any
+    ) -> 'Experiment':
         """Match readings to the surface; those without groups get the rows or columns found.
+
+        ``known`` are other attributes.
 
         Raises:
             ReadingsError: readings too far off the surface or on its other side, or of several
@@ -81,18 +81,13 @@ class Experiment:
             lines = columns_or_rows(surface, path, place.positions_m)
             readings = replace(readings, group=lines[means.owner])
         used = np.ones(len(readings), dtype=bool)
-        return Experiment(
-            name, surface, path, readings, means, points, readings, used, files or {},
-            settings or {}, switched_off, frame_id, films,
-        )  # fmt: skip
+        return Experiment(name, surface, path, readings, means, points, readings, used, **known)
 
     def with_readings(self, readings: Readings) -> 'Experiment':
         """The part with other readings; raises what ``of`` does."""
-        found = Experiment.of(
-            self.name, self.surface, self.path, readings, self.files, self.settings,
-            self.switched_off, self.frame_id, self.films,
-        )  # fmt: skip
-        return replace(found, layer=self.layer, zones=self.zones, target=self.target)
+        found = Experiment.of(self.name, self.surface, self.path, readings)
+        matched = ('readings', 'means', 'points', 'taken', 'used')
+        return replace(self, **{name: getattr(found, name) for name in matched})
 
     def read_as(self, readings: Readings) -> 'Experiment':
         """The part with other films read at the same points; nothing is matched anew."""

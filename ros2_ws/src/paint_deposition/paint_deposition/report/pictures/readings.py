@@ -13,7 +13,8 @@ from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.regions import interpolate_over_surface
 from paint_deposition.inference.design.reading_choice import ChosenReadings
-from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
+from paint_deposition.inference.fitting.calibration import Calibration
+from paint_deposition.inference.fitting.panel import PanelFit
 from paint_deposition.report.colour_scales import film_scale, residual_scale
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.film import page_film
@@ -207,7 +208,7 @@ def write_calibration_pictures(
 def draw_collapse(axes: Axes, calibration: Calibration, one: PanelFit) -> None:
     """Draw eq. (3) of a panel with its three Gaussians, and the 2D model's own collapse."""
     quiet(axes, 'across the pass [mm]', 'film [µm]', 'One pass, eq. (3)')
-    fitted, panel = one.collapse.collapse, one.panel
+    fitted, panel = one.collapse, one.panel
     x = np.linspace(-0.6, 0.6, LINE_POINTS) * fitted.reach_m
     names = (r'at $+r_1$', r'at $-r_2$', 'centred')
     for part, name, colour in zip(fitted.components_um(x), names, COMPONENTS, strict=True):
