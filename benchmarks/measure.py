@@ -28,7 +28,7 @@ from paint_deposition.inference.design.reading_choice import ChosenReadings, cho
 from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.gauge_places import grid_places
+from paint_deposition.inference.readings.places import grid_places
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection

@@ -60,7 +60,7 @@ def test_a_film_that_is_thick_everywhere_has_the_colours_for_itself(film, ends):
 
 
 def test_residual_scale_is_even_about_zero():
-    scale = residual_scale(np.array([-7.0, 3.0]))
+    scale = residual_scale(7.0)
     assert (scale.low, scale.high) == (-8.0, 8.0)
     grey = scale.rgba(np.array([0.0]), np.array([True]))[0, :3]
     assert np.ptp(grey.astype(int)) < 5

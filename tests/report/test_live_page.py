@@ -148,6 +148,7 @@ def test_a_page_for_other_machines_gets_a_token_and_one_for_this_machine_hears_i
     [
         (['watch'], 'give RUN, or --live'),
         (['watch', '--live'], 'give --mesh'),
+        (['watch', '--live', '--mesh', 'door.stl', '--rate', '4'], '--rate is for a recorded RUN'),
         (['watch', 'nowhere'], 'is not there; give a recorded run'),
         (['watch', '.', '--port', '0'], 'does not name the mesh'),
         (['watch', 'nowhere', '--tolerance-um', '2'], 'no --target-um'),

@@ -22,7 +22,7 @@ from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.model_space import SIZES
 from paint_deposition.inference.diagnosis.proposals import Spray, StationarySpray, spots, suits
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.inference.readings.gauge_places import grid_places
+from paint_deposition.inference.readings.places import grid_places
 
 
 def on_panel(*names: str) -> UnmeasuredPart:

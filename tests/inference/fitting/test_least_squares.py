@@ -196,7 +196,7 @@ def test_a_model_survives_the_way_there_and_back(planar, shift_m, gain):
 def test_shapes_are_varied_on_a_logarithmic_scale():
     """Neutral is the centre; the whole physical range is a few widths of the prior."""
     parameters = FreeParameters.of(pd.DepositionModel(), CornerSlowdown(gain=0.5))
-    assert parameters.names[len(PATTERN) :] == ('corner_slowdown.gain', 'corner_slowdown.length_m')
+    assert parameters.varied == (('corner_slowdown', 'gain'), ('corner_slowdown', 'length_m'))
     vector = parameters.encode(parameters.start)
     info = CornerSlowdown.parameters()['length_m']
     lengths = []

@@ -15,7 +15,7 @@ from paint_deposition.inference.readings.gauge_noise import (
     gross_outliers,
     left_out_lines,
 )
-from paint_deposition.inference.readings.placement import columns_or_rows, unit_in_doubt
+from paint_deposition.inference.readings.places import columns_or_rows, unit_in_doubt
 from paint_deposition.inference.readings.readings import (
     PointMeans,
     Residuals,

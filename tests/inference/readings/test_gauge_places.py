@@ -3,7 +3,7 @@
 import numpy as np
 
 from booth import panel
-from paint_deposition.inference.readings.gauge_places import (
+from paint_deposition.inference.readings.places import (
     can_stand,
     from_edges_m,
     grid_places,

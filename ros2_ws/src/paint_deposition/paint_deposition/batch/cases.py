@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import io
 import logging
-import os
 import pickle
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -183,20 +182,16 @@ def code_digest() -> str:
 @contextmanager
 def _used_alone(folder: Path) -> Iterator[None]:
     """Refuse a folder that another command uses; the system frees it when a command dies."""
-    from fcntl import LOCK_EX, LOCK_NB, flock
+    from filelock import FileLock, Timeout
 
     folder.mkdir(parents=True, exist_ok=True)
-    descriptor = os.open(folder, os.O_RDONLY)
     try:
-        try:
-            flock(descriptor, LOCK_EX | LOCK_NB)
-        except BlockingIOError:
-            raise BatchError(
-                f'{folder} is in use by another command; wait for it, or choose another --output'
-            ) from None
-        yield
-    finally:
-        os.close(descriptor)
+        with FileLock(folder / '.lock', timeout=0):
+            yield
+    except Timeout:
+        raise BatchError(
+            f'{folder} is in use by another command; wait for it, or choose another --output'
+        ) from None
 
 
 def finished(

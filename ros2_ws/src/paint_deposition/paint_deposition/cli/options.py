@@ -53,13 +53,13 @@ class File(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == '':
             name = param.opts[0] if param else 'the path'
-            raise click.UsageError(f'{name} is empty; give a file', ctx)
+            raise click.UsageError(f'{name} is empty; give a path', ctx)
         return super().convert(value, param, ctx)
 
 
 NUMBER, POSITIVE, NOT_NEGATIVE = FiniteRange(), FiniteRange(0.0, min_open=True), FiniteRange(0.0)
 FILE = File(path_type=Path)
-FOLDER = click.Path(path_type=Path, file_okay=False)
+FOLDER = File(path_type=Path, file_okay=False)
 
 
 def options_of(

@@ -175,82 +175,76 @@ def results_in(folder: Path) -> Iterator[Path]:
     # The temporary folder of this machine: a lock beside the results would stay there.
     key = hashlib.sha256(f'{Path.home()} {folder}'.encode()).hexdigest()[:16]
     with locked(Path(tempfile.gettempdir()) / f'paint-{key}.lock'):
-        place = _Place(folder)
-        place.put_right()
+        names = (f'.{folder.name}.paint_{what}' for what in ('work', 'former'))
+        work, former = map(folder.with_name, names)
+        _put_right(folder, work, former)
         made = [parent for parent in folder.parents if not parent.exists()]
-        place.work.mkdir(parents=True)
+        work.mkdir(parents=True)
         try:
-            yield place.work
-            place.replace()
+            yield work
+            _replace(folder, work, former)
         finally:
-            place.put_right()
+            _put_right(folder, work, former)
             with suppress(OSError):  # it is not empty any more
                 for parent in made:
                     parent.rmdir()
 
 
-class _Place:
-    """A folder of results and, beside it, the work folder and the former results."""
+def _replace(folder: Path, work: Path, former: Path) -> None:
+    """Put the former results aside, by one rename where nothing else is there; the new in."""
+    old, new = _written(folder), _files_below(work)
+    present = {path.name for path in folder.iterdir()} if folder.exists() else set()
+    ours = _tops(old | new)
+    for name in sorted(ours & present):
+        path = folder / name
+        held = {f'{name}/{file}' for file in _files_below(path)} if _is_tree(path) else {name}
+        for strange in sorted(held - old):
+            raise PaintError(
+                f'{folder / strange} was not written by paint; move it away, or choose '
+                'another --output'
+            )
+    if not folder.exists() or (
+        MARKER in present <= ours | {MARKER} and not Path.cwd().is_relative_to(folder)
+    ):
+        _mark(work, work, new)
+        with suppress(FileNotFoundError):
+            shutil.copymode(folder, work)
+            folder.rename(former)
+        work.rename(folder)
+        return
+    _mark(work, folder, old | new)
+    former.mkdir()
+    _mark(work, former, old)
+    for name in sorted(ours & present):
+        (folder / name).rename(former / name)
+    for path in sorted(work.iterdir()):
+        path.rename(folder / path.name)
+    former.rename(work / 'former')  # from here on the new results count
+    _mark(work, folder, new)
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.work, self.former = (
-            folder.with_name(f'.{folder.name}.paint_{what}') for what in ('work', 'former')
-        )
 
-    def replace(self) -> None:
-        """Put the former results aside, by one rename where nothing else is there; the new in."""
-        old, new = _written(self.folder), _files_below(self.work)
-        present = {path.name for path in self.folder.iterdir()} if self.folder.exists() else set()
-        ours = _tops(old | new)
-        for name in sorted(ours & present):
-            path = self.folder / name
-            held = {f'{name}/{file}' for file in _files_below(path)} if _is_tree(path) else {name}
-            for strange in sorted(held - old):
-                raise PaintError(
-                    f'{self.folder / strange} was not written by paint; move it away, or choose '
-                    'another --output'
-                )
-        if not self.folder.exists() or (
-            MARKER in present <= ours | {MARKER} and not Path.cwd().is_relative_to(self.folder)
-        ):
-            self._mark(self.work, new)
-            with suppress(FileNotFoundError):
-                shutil.copymode(self.folder, self.work)
-                self.folder.rename(self.former)
-            self.work.rename(self.folder)
-            return
-        self._mark(self.folder, old | new)
-        self.former.mkdir()
-        self._mark(self.former, old)
-        for name in sorted(ours & present):
-            (self.folder / name).rename(self.former / name)
-        for path in sorted(self.work.iterdir()):
-            path.rename(self.folder / path.name)
-        self.former.rename(self.work / 'former')  # from here on the new results count
-        self._mark(self.folder, new)
+def _put_right(folder: Path, work: Path, former: Path) -> None:
+    """Bring back former results unless the new ones count, and remove the rest."""
+    if _is_tree(former) and not folder.exists():
+        former.rename(folder)
+    if _is_tree(work) and (former / MARKER).is_file():
+        old = _tops(_written(former))
+        for name in _tops(_written(folder)):
+            is_new = name not in old or (former / name).exists()
+            if is_new and (folder / name).exists():
+                (folder / name).rename(work / name)
+        for path in sorted(former.iterdir(), reverse=True):  # its marker last
+            path.replace(folder / path.name)
+    for path in (former, work):
+        if _is_tree(path):
+            shutil.rmtree(path)
 
-    def put_right(self) -> None:
-        """Bring back former results unless the new ones count, and remove the rest."""
-        if _is_tree(self.former) and not self.folder.exists():
-            self.former.rename(self.folder)
-        if _is_tree(self.work) and (self.former / MARKER).is_file():
-            old = _tops(_written(self.former))
-            for name in _tops(_written(self.folder)):
-                is_new = name not in old or (self.former / name).exists()
-                if is_new and (self.folder / name).exists():
-                    (self.folder / name).rename(self.work / name)
-            for path in sorted(self.former.iterdir(), reverse=True):  # its marker last
-                path.replace(self.folder / path.name)
-        for path in (self.former, self.work):
-            if _is_tree(path):
-                shutil.rmtree(path)
 
-    def _mark(self, folder: Path, files: set[str]) -> None:
-        """Name the files in the marker of a folder, by way of the work folder."""
-        copy = self.work / f'{MARKER}_copy'
-        write_text(copy, ''.join(f'{name}\n' for name in sorted(files)))
-        copy.replace(folder / MARKER)
+def _mark(work: Path, folder: Path, files: set[str]) -> None:
+    """Name the files in the marker of a folder, by way of the work folder."""
+    copy = work / f'{MARKER}_copy'
+    write_text(copy, ''.join(f'{name}\n' for name in sorted(files)))
+    copy.replace(folder / MARKER)
 
 
 def _written(folder: Path) -> set[str]:

@@ -11,6 +11,7 @@ from threading import Event
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 import paint_deposition as pd
 from paint_deposition.cli import options
@@ -22,6 +23,12 @@ from paint_deposition.report.live_page import DEFAULT_HOST, DEFAULT_PORT, TOKEN,
 if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
     from paint_deposition.request import FilmBand
+
+# Options of `watch` that say how a cell is shown live; all others are of a recorded run.
+OF_LIVE = (
+    'live', 'mesh', 'mesh_scale', 'max_edge_length_m', 'down', 'target_um', 'tolerance_um', 'host',
+    'port', 'token',
+)  # fmt: skip
 
 
 @click.command('watch')
@@ -69,10 +76,17 @@ def watch_command(
     if live and not part.mesh:
         raise click.UsageError("--live needs the mesh of the simulator's part; give --mesh")
     if run is None:
+        context = click.get_current_context()
+        for option in context.command.params:
+            name = option.name or ''
+            is_given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+            if is_given and name not in OF_LIVE:
+                raise click.UsageError(f'{option.opts[0]} is for a recorded RUN, not for --live')
         values = {
             'mesh_file': part.mesh, 'mesh_scale': part.mesh_scale,
             'max_edge_length_m': part.max_edge_length_m, 'target_um': band.target_um,
             'target_tolerance_um': band.tolerance_um, 'host': host, 'port': port,
+            'down': None if part.down is None else list(part.down),
         }  # fmt: skip
         # This process becomes the node, which says what it needs; others can read its words.
         os.environ[TOKEN] = token

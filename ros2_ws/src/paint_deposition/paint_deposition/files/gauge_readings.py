@@ -21,7 +21,7 @@ from paint_deposition.files.tables.reading_columns import (
 )
 from paint_deposition.files.tables.readings import GUESSED, ReadingTable
 from paint_deposition.files.tables.sheets import FORMULA
-from paint_deposition.inference.readings.gauge_places import on_face_m
+from paint_deposition.inference.readings.places import on_face_m
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
 from paint_deposition.part.surface import Surface
 

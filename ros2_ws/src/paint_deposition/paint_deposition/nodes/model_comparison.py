@@ -125,7 +125,7 @@ class ModelComparison(PaintingNode):
     @property
     def _scale(self) -> ColourScale:
         thickest = float(np.abs(self.readings.thickness_um).max())
-        return residual_scale(np.array([0.25 * thickest]), self.values['color_max_um'])
+        return residual_scale(0.25 * thickest, self.values['color_max_um'])
 
     @property
     def _model_name(self) -> str:

@@ -74,10 +74,9 @@ def film_scale(film_um: np.ndarray, low_um: float = 0.0, high_um: float = 0.0) -
     return ColourScale(low_um, high_um, FILM_PALETTE)
 
 
-def residual_scale(residual_um: np.ndarray, largest_um: float = 0.0) -> ColourScale:
-    """The scale for residuals [um], even about 0: fixed, or to a round figure if 0."""
-    if largest_um == 0.0:
-        largest_um = round_up(float(np.abs(residual_um).max(initial=0.0)))
+def residual_scale(greatest_um: float, fixed_um: float = 0.0) -> ColourScale:
+    """The scale for residuals of this size [um], even about 0: fixed, or to a round figure."""
+    largest_um = fixed_um or round_up(greatest_um)
     return ColourScale(-largest_um, largest_um, RESIDUAL_PALETTE)
 
 

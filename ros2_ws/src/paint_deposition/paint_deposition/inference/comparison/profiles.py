@@ -13,7 +13,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import STENCIL_M, Experiment
-from paint_deposition.inference.readings.placement import FEWEST_ON_A_LINE, passes_are_level
+from paint_deposition.inference.readings.places import FEWEST_ON_A_LINE, passes_are_level
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.orientation import STANDING_COSINE, across_axis, downhill_axis
 from paint_deposition.part.surface import Surface

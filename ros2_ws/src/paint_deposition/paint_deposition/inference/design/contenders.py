@@ -48,7 +48,7 @@ from paint_deposition.inference.diagnosis.smooth_laws import NEGLIGIBLE
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.random_effects import field_over_values
+from paint_deposition.inference.fitting.random_effects import root_of_field
 from paint_deposition.inference.fitting.study import Study
 
 # Effects that compete at the most.
@@ -90,7 +90,7 @@ class Contender:
         columns = [study.nuisance, errors]
         if self.covariate:
             values = standardised(study, usual.model)[self.covariate]
-            law = SIZES[-1] * FACTOR * field_over_values(values, LAW_LENGTH, NEGLIGIBLE)
+            law = SIZES[-1] * FACTOR * root_of_field(values, LAW_LENGTH, NEGLIGIBLE)
             columns.append((fit.predicted_um / study.sigma_um)[:, np.newaxis] * law)
         discrepancy = usual.around(study, fit).covariance(self.sizes)
         return NullModel.around(fit, np.hstack(columns), discrepancy=discrepancy)

@@ -138,7 +138,7 @@ def _tried(
     spray = Spray(
         _in_words(study, experiment, change, stand),
         tuple(contender.name for contender in contenders), then,
-        now, len(film_um), experiment.name, change.keys if stand is None else (KEY, *change.keys),
+        now, len(film_um), experiment.name, (*([KEY] if stand else []), *change.key.split()),
         forecast.chance, stand.peak_um if stand else float(film_um.max()),
         float(experiment.means.mean_um.max()), stand,
     )  # fmt: skip

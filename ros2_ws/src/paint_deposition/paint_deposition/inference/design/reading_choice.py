@@ -24,7 +24,7 @@ from paint_deposition.inference.diagnosis.model_space import SIZES
 from paint_deposition.inference.diagnosis.testability import LEVEL
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.readings.gauge_noise import ASSUMED_FREEDOM, ENOUGH_REPEATS
-from paint_deposition.inference.readings.gauge_places import (
+from paint_deposition.inference.readings.places import (
     FOOT_M,
     can_stand,
     from_edges_m,

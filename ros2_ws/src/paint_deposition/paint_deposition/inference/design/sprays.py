@@ -19,19 +19,13 @@ LONGER_OPEN_S = 0.3
 class Change:
     """What is done otherwise than in a recorded spray."""
 
-    key: str  # one word
+    key: str  # one word, or two for two changes at once
     words: str  # complete 'the same passes ...'
     # Gives the experiment painted that way, or None where the part does not allow it.
     made: Callable[[Experiment], Experiment | None]
     kind: str  # changes of one kind exclude each other
     # 1 for an entry in the programme; more where someone must lay hands on part or cell.
     cost: float = 1.0
-    both: tuple['Change', ...] = ()  # the two changes that this one consists of, if it does
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Keys of the single changes."""
-        return tuple(change.key for change in self.both) or tuple(filter(None, [self.key]))
 
 
 def together(first: Change, second: Change) -> Change:
@@ -41,8 +35,8 @@ def together(first: Change, second: Change) -> Change:
         changed = first.made(experiment)
         return None if changed is None else second.made(changed)
 
-    words = f'{first.words} and {second.words}'
-    return Change('', words, made, '', first.cost + second.cost, (first, second))
+    key, words = f'{first.key} {second.key}', f'{first.words} and {second.words}'
+    return Change(key, words, made, '', first.cost + second.cost)
 
 
 def pairs(changes: Sequence[Change]) -> Iterator[Change]:

@@ -25,7 +25,7 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
 )
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.random_effects import field_over_values
+from paint_deposition.inference.fitting.random_effects import root_of_field
 from paint_deposition.inference.fitting.study import Study
 
 # Amplitudes are stepped by this share of their typical size.
@@ -310,7 +310,7 @@ def _off_anywhere(
     for effect, change in _changes(study, fit, kept):
         over = [name for name in covariates if (name in effect.covariates) == own]
         for name in over:
-            root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
+            root = root_of_field(covariates[name], LAW_LENGTH, NEGLIGIBLE)
             yield size / np.sqrt(len(over)) * change[:, np.newaxis] * root
 
 
@@ -351,5 +351,5 @@ def _laws_off(
                 curve = basis.random(size, LAW_LENGTH)
                 yield effect, study.has(type(effect))[:, np.newaxis] * curve.change_um, curve
             else:
-                root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
+                root = root_of_field(covariates[name], LAW_LENGTH, NEGLIGIBLE)
                 yield effect, scale * change[:, np.newaxis] * root, None

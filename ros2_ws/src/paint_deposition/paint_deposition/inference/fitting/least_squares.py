@@ -172,8 +172,8 @@ def _best_starts(
     so that only these three need be searched (variable projection, Golub and Pereyra 1973).
     """
     shape = [
-        k for k, name in enumerate(problem.parameters.names[: len(problem.parameters.pattern)])
-        if name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
+        k for k, entry in enumerate(problem.parameters.pattern.coordinates)
+        if entry.name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
     ]  # fmt: skip
     width = problem.prior.width
     # Eight candidate shapes of the pattern for each start.

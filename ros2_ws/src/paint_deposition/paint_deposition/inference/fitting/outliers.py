@@ -16,11 +16,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import expit, logsumexp
+from scipy.stats import norm
 
-from paint_deposition.inference.fitting.random_effects import field_over_values, root_of_field
+from paint_deposition.inference.fitting.random_effects import root_of_field
 from paint_deposition.inference.readings.covariates import Covariate
 
 # The film's texture, as a share of it: what is usual, within a factor of two, and what may be.
@@ -70,7 +70,7 @@ class LeaveOneOut:
     @staticmethod
     def of(misfit: FittedPoints) -> 'LeaveOneOut':
         """Compute all models."""
-        log_prior = _log_normal(np.log(TEXTURES / USUAL_TEXTURE) / np.log(2.0))
+        log_prior = norm.logpdf(np.log(TEXTURES / USUAL_TEXTURE) / np.log(2.0))
         found, residual = [], misfit.residual_um
         for field, log_share in _fields(misfit):
             directions = np.hstack([misfit.free_um, field])
@@ -93,24 +93,18 @@ class LeaveOneOut:
     @property
     def log_density(self) -> np.ndarray:
         """(P,) logarithm of the density that the other readings predict for each [1/um]."""
-        own = _log_normal(self.residual_um, self.expected_um, self.sigma_um)
+        own = norm.logpdf(self.residual_um, self.expected_um, self.sigma_um)
         others = self.log_weight[:, np.newaxis] - own
         return logsumexp(self.log_weight) - logsumexp(others, axis=0)
 
     def predicted(self, row: int) -> tuple[float, float]:
         """Residual that the other readings predict for one, and its standard deviation [um]."""
-        own = _log_normal(self.residual_um[row], self.expected_um[:, row], self.sigma_um[:, row])
+        own = norm.logpdf(self.residual_um[row], self.expected_um[:, row], self.sigma_um[:, row])
         log_weight = self.log_weight - own
         weight = np.exp(log_weight - logsumexp(log_weight))
         mean = float(weight @ self.expected_um[:, row])
         square = float(weight @ (self.sigma_um[:, row] ** 2 + self.expected_um[:, row] ** 2))
         return mean, float(np.sqrt(square - mean**2))
-
-
-def _log_normal(value: ArrayLike, mean: ArrayLike = 0.0, sigma: ArrayLike = 1.0) -> np.ndarray:
-    """Logarithm of the normal density."""
-    away = np.subtract(value, mean) / sigma
-    return -0.5 * away**2 - 0.5 * np.log(2.0 * np.pi) - np.log(sigma)
 
 
 def _solved(variance: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, float]:
@@ -133,7 +127,7 @@ def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
     # Lengths of correlation: over the part [m], over a covariate in its standard deviations.
     over_part = [root_of_field(apart, length, NEGLIGIBLE) for length in (0.1, 0.25)]
     scaled = [(c.values - c.values.mean()) / c.values.std() for c in misfit.covariates if c.varies]
-    over = [field_over_values(values, 0.5, NEGLIGIBLE) for values in scaled]
+    over = [root_of_field(values, 0.5, NEGLIGIBLE) for values in scaled]
     every = np.hstack([over_part[-1], *over])
     roots = [*over_part, *over, every]
     yield np.empty((len(film), 0)), np.log(0.5)

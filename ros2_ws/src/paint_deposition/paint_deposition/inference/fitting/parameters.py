@@ -119,12 +119,6 @@ class FreeParameters:
         return PatternVector(tuple(brush.number for brush in self.start.brushes))
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each entry."""
-        of_effects = (f'{e}.{n}' for e, n in self.varied)
-        return (*(c.name for c in self.pattern.coordinates), *of_effects)
-
-    @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the entries in a posterior: there it is ``offset`` + ``scale`` times one."""
         effects = (f'{e.effect}.{e.coordinate}' for e in self.of_effects)

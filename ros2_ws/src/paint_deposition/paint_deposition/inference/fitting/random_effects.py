@@ -157,11 +157,11 @@ def root_of_field(
     """(N, n) square root of the covariance of a field of unit variance; not to be changed.
 
     Args:
-        places: (N, D) where its values are.
+        places: (N,) or (N, D) where its values are.
         negligible: directions below this share of the largest variance are left out.
         correlation: at a distance over the length.
     """
-    places = np.ascontiguousarray(places, dtype=float)
+    places = np.ascontiguousarray(places, dtype=float).reshape(len(places), -1)
     return _root(places.tobytes(), places.shape, length, negligible, correlation)
 
 
@@ -177,8 +177,3 @@ def _root(
     root = vectors[:, kept] * np.sqrt(values[kept])
     root.flags.writeable = False
     return root
-
-
-def field_over_values(values: np.ndarray, length: float, negligible: float) -> np.ndarray:
-    """(P, n) root of a field of unit variance over values (P,), with a length of correlation."""
-    return root_of_field(values[:, np.newaxis], length, negligible)

@@ -10,7 +10,7 @@ import numpy as np
 from paint_deposition.errors import ReadingsError
 from paint_deposition.film.common_film import ONE_FILM, TOTAL, WetFilms
 from paint_deposition.inference.readings.gauge_noise import left_out_lines
-from paint_deposition.inference.readings.placement import (
+from paint_deposition.inference.readings.places import (
     columns_or_rows,
     refuse_off_surface,
     refuse_other_side,

@@ -10,7 +10,7 @@ from paint_deposition.errors import ModelError, ReadingsError, some
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.placement import unit_in_doubt
+from paint_deposition.inference.readings.places import unit_in_doubt
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import NONE

@@ -118,7 +118,7 @@ class DepositionSimulator(PaintingNode):
             write = self.film_writer(Path(self.values['output_directory']), stem)
             paths = await self.result_of(self._saving.submit(write))
         except Exception as error:  # reported to the caller of the service
-            response.message = str(error)
+            response.message = str(error) or 'not enough memory'
             return response
         response.success = True
         response.paths = [str(path) for path in paths]

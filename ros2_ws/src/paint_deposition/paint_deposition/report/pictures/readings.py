@@ -76,7 +76,7 @@ def residual_figures(data: ReportData, index: int, part: PartPicture) -> list[Fi
     room = 0.03 * (part.high_m - part.low_m).max()
     # Few readings beyond the end of the colours do not take the contrast from all others.
     largest = float(np.quantile(np.abs(np.concatenate(data.residuals_um)), 0.98))
-    scale = residual_scale(np.array([largest]))
+    scale = residual_scale(largest)
     places = part.view.flat(positions)
     figures = []
     for name, residual_um in zip(data.model_names, data.residuals_um, strict=True):

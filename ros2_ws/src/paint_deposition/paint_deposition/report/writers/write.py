@@ -160,7 +160,8 @@ def _write_simulation(
         files.append(folder / 'predicted.csv')
         write_predictions(files[-1], result.readings, result.predicted_um)
     mesh, motion, model = (
-        Path(about.get(key, '')).name for key in ('mesh_file', 'trajectory', 'model_file')
+        ', '.join(Path(file).name for file in str(about.get(key, '')).split(', '))
+        for key in ('mesh_file', 'trajectory', 'model_file')
     )
     picture = film_picture(
         result.surface, result.film_um, result.path, result.statistics,
