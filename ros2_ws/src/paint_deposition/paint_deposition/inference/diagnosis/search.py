@@ -41,8 +41,7 @@ from paint_deposition.inference.diagnosis.model_space import (
 from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
 from paint_deposition.inference.fitting.least_squares import Fit
 
-# So many proposals are refitted each time, but for single effects: these are all refitted once, as
-# the pattern that was fitted without any may imitate the one that acts.
+# So many effects are tried beside an effect.
 TRIALS = 5
 # Around so many of the single effects that fit best another pattern and a second effect are tried.
 LEADING = 3
@@ -166,8 +165,12 @@ class EffectSet:
 
     @cached_property
     def proposed(self) -> tuple[str, ...]:
-        """Effects that may be missing beside it, the most probable first."""
-        return tuple(cause for cause in self.space.alone if cause != UNKNOWN)[:TRIALS]
+        """Effects to try beside it, the most probable first; of single ones all.
+
+        A pattern that was fitted without any may imitate the one that acts.
+        """
+        causes = [cause for cause in self.space.alone if cause != UNKNOWN]
+        return tuple(causes[: TRIALS if self.names else None])
 
     def log_weight_of(self, rows: np.ndarray) -> float:
         """Logarithm of the weight by some readings (P,), at the best sizes of the discrepancy.
@@ -211,7 +214,6 @@ class Search:
         self._trials: dict[frozenset[str], EffectSet] = {}
         self._tried: set[frozenset[str]] = set()
         self._patterns: tuple[DepositionModel, ...] = ()
-        self._leading: tuple[str, ...] = ()  # single effects that fitted best
         self.nothing = self._refitted({}, EffectSet.around(state, frozenset(), state.fit))
 
     def with_effect(self, parent: EffectSet, name: str) -> EffectSet:
@@ -261,7 +263,7 @@ class Search:
         here = self._near_best()
         while True:
             room = len(here.names) < 4  # so many effects at the most
-            proposals = self._proposals(here) if room else ()
+            proposals = here.proposed if room else ()
             stage = SearchStage(here, [self.with_effect(here, name) for name in proposals])
             again = self._in_another_pattern(stage)
             if again is not here:
@@ -275,11 +277,6 @@ class Search:
             found.append(stage)
             here = best
 
-    def _proposals(self, here: EffectSet) -> tuple[str, ...]:
-        """Effects to try beside a set."""
-        leading = () if here.names else self._leading
-        return tuple(dict.fromkeys((*here.proposed, *leading)))
-
     def _near_best(self) -> EffectSet:
         """Nothing missing, with the discrepancy around the best fit with one effect.
 
@@ -287,9 +284,8 @@ class Search:
         deviations of its footprint with it. All sets that are compared have the same.
         """
         nothing = self.nothing
-        tried = {n: self.with_effect(nothing, n) for n in nothing.space.alone if n != UNKNOWN}
+        tried = {name: self.with_effect(nothing, name) for name in nothing.proposed}
         order = sorted(tried, key=lambda name: -tried[name].log_weight)
-        self._leading = tuple(order[:TRIALS])
         least = nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN
         near: list[EffectSet] = []
         for one in (tried[name] for name in order[:LEADING]):
@@ -303,7 +299,7 @@ class Search:
             return nothing
         best = max(near, key=lambda one: one.log_evidence)
         self._trials, self._tried = {best.names: best}, set()
-        self._patterns = (nothing.fit.model,)
+        self._patterns = (nothing.fit.model, *(one.fit.model for one in near))
         for start in (replace(nothing, usual=best.usual, sizes=best.sizes), best):
             self.nothing = self._refitted({}, start)
         return self.nothing
@@ -326,7 +322,7 @@ class Search:
 
     def beside(self, trial: EffectSet) -> dict[str, float]:
         """Effects that may act beside a set, with their probabilities if one at the most does."""
-        for name in self._proposals(trial):
+        for name in trial.proposed:
             self.with_effect(trial, name)
         larger = {
             name: one
@@ -366,7 +362,7 @@ class Search:
         None could whose model is less probable than the one without any.
         """
         others = self.without(trial, name)
-        rivals = dict.fromkeys((name, *self._proposals(others)))
+        rivals = dict.fromkeys((name, *others.proposed))
         tried = {rival: self.with_effect(others, rival) for rival in rivals}
         weights = {rival: one.log_weight for rival, one in tried.items()}
         found = sorted(weights, key=lambda cause: -weights[cause])
