@@ -205,6 +205,9 @@ def test_openings_end_where_the_brush_changes_also_between_poses_and_moves_keep_
     assert opened == [(1.0, 1), (1.0, 2), (0.5, 2)]
     moves = [(m.flow, m.brush) for m in moves_of(programme, ImproveRequest()) if m.spraying]
     assert list(dict.fromkeys(moves)) == [(1.0, 1), (1.0, 2), (0.5, 2)]
+    # The first pose, left from standstill, is come to as fast as the gun is opened.
+    from_rest = replace(programme, duration_s=np.append(4.0, programme.duration_s[1:]))
+    assert moves_of(from_rest, ImproveRequest())[0].speed_m_per_s == pytest.approx(0.3)
     # Two openings meet where no pose is: none takes no time.
     flows = switched(stamps_ns([0.503, 1.507, 2.0]), (1, 1), (1, 2), (0, 0))
     programme = Programme.of(replace(SWITCHED, **flows))
