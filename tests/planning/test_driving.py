@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 from rosbags.highlevel import AnyReader
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
@@ -17,7 +17,7 @@ from paint_deposition.api.planning import place, read_robot
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.part_frame import Rigid, at_part, moved
-from paint_deposition.planning.joints import starts
+from paint_deposition.planning.joints import JointPace, starts
 from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import driven, plan
 from paint_deposition.planning.requests import PlanRequest
@@ -107,6 +107,23 @@ def test_a_slow_joint_slows_its_passes_each_as_a_whole(planned, cell, on_robot):
     speed = step_m / (1e-9 * np.diff(first.stamps_ns[inside]))
     assert speed.max() < 1.02 * speed.min()
     assert speed.mean() == pytest.approx(0.2 * limits[0].share, rel=0.02)
+
+
+def test_a_turn_beside_the_passes_slows_itself_only(cell):
+    """A joint turns back between two passes, at 1/20 of the acceleration that this needs."""
+    times_s = np.arange(0.0, 4.001, 0.02)
+    turned = 0.5 * np.abs(times_s[:, np.newaxis] - 2.0) * np.eye(6)[0]
+    most = np.full(6, 2.5)
+    pace = JointPace(cell.arm, times_s, CubicSpline(times_s, turned), most)
+    spray_pass = np.select([times_s < 1.5, times_s > 2.5], [0, 1], -1)
+    shares = pace.shares(spray_pass)
+    reached_s, seconds, _, speeds, over = pace.driven(shares)
+    assert shares[spray_pass >= 0] == pytest.approx(1.0)
+    assert pace.limits(spray_pass, shares) == ()
+    assert over.max() <= 1.0
+    rates = np.diff(speeds, axis=0) / np.diff(seconds)[:, np.newaxis]
+    assert (np.abs(rates) <= 1.001 * most).all()
+    assert reached_s[-1] < 1.3 * times_s[-1]
 
 
 def test_the_tool_rolls_where_its_pattern_is_round_only(planned, cell, on_robot):

@@ -121,7 +121,7 @@ class RobotCell:
             near = np.abs(at_s[nearest] - times_s) <= 0.5 * sprayed.dwell_s[nearest] + STEP_S
             spray_pass[near] = sprayed.spray_pass[nearest][near]
         shares = pace.shares(spray_pass)
-        reached_s, seconds, driven, speeds = pace.driven(shares)
+        reached_s, seconds, driven, speeds, _ = pace.driven(shares)
 
         def slowed_ns(stamps_ns: np.ndarray) -> np.ndarray:
             later_s = np.interp(1e-9 * (stamps_ns - first_ns), times_s, reached_s)
