@@ -20,6 +20,7 @@ from paint_deposition.motion.part_frame import Rigid, at_part, moved
 from paint_deposition.planning.joints import JointPace, starts
 from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import driven, plan
+from paint_deposition.planning.programme import Programme
 from paint_deposition.planning.requests import PlanRequest
 from planning.test_surface_map import sheet
 from scenes import painted
@@ -107,6 +108,18 @@ def test_a_slow_joint_slows_its_passes_each_as_a_whole(planned, cell, on_robot):
     speed = step_m / (1e-9 * np.diff(first.stamps_ns[inside]))
     assert speed.max() < 1.02 * speed.min()
     assert speed.mean() == pytest.approx(0.2 * limits[0].share, rel=0.02)
+
+
+def test_an_improvement_is_that_which_the_robot_drives(planned, cell):
+    better = pd.improve(
+        planned.surface, planned.trajectory, ROUND, robot=replace(cell, acceleration=0.3)
+    )
+    assert better.drive.limits
+    assert 'bound by the joints' in better.warnings[-1]
+    clock = Programme.of(better.trajectory)
+    for change in better.changes:
+        seconds = np.diff(clock.seconds_at(np.array(change.place_m)))[0]
+        assert change.speed_m_per_s[1] == pytest.approx(np.ptp(change.place_m) / seconds, rel=0.01)
 
 
 def test_a_turn_beside_the_passes_slows_itself_only(cell):

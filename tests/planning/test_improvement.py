@@ -144,7 +144,7 @@ def test_a_mean_that_the_limits_do_not_allow_is_warned_of(panel, even):
     assert slow.after.mean_um > 1.1 * slow.retiming.target_um
     (warning,) = slow.warnings
     assert 'the greatest speed' in warning
-    assert 'allow a greater speed (speed_max_m_per_s) or a lower flow' in warning
+    assert 'allow a greater speed (--speed-max) or a lower flow (--flow)' in warning
 
 
 @pytest.mark.slow

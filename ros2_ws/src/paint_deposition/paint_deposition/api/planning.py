@@ -206,13 +206,13 @@ def improve(
     if posterior is not None:
         models += draw_models(model, posterior, 8, seed)
     retiming = retime_for_evenness(surface, sought, original, models, request, progress)
-    programme, drive = retiming.programme, None
+    drive = None
     if robot:
-        drive = robot.drive(programme.trajectory(), free_roll=False, begin=begin)
-        programme = Programme.of(drive.trajectory)
-    moves = moves_of(programme, request)
+        drive = robot.drive(retiming.programme.trajectory(), free_roll=False, begin=begin)
+        retiming = replace(retiming, programme=Programme.of(drive.trajectory))
+    moves = moves_of(retiming.programme, request)
     progress('the film as it will be', 0.0)
-    improved = programme.trajectory()
+    improved = retiming.programme.trajectory()
     new_um, new_paint = simulated(surface, model, improved)
     program_um, _ = simulated(surface, model, timed(moves, gun_known=True))
     tolerance = request.tolerance or DEFAULT_TOLERANCE
