@@ -159,7 +159,8 @@ def folded(tmp_path):
 def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(folded, tmp_path):
     options = ('--faces', 'auto', '--target-um', 20, '--max-edge-length-m', 0.06, '--json')
     plans = []
-    for more in (('--keep-off-m', 0.4), ('--optimise',)):
+    free = '--optimise', '--paint-weight', 0, '--time-weight', 0
+    for more in (('--keep-off-m', 0.4), free):
         done = ran('plan', '--mesh', folded, *options, *more, '-o', tmp_path / 'plan')
         plans.append(json.loads(done.stdout))
         near = 'warning: the part is too near before the gun at (' in done.stderr
