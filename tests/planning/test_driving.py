@@ -210,7 +210,8 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
     pd.write_model(model, ROUND)
     part = '--mesh', tmp_path / 'flat.stl', '--max-edge-length-m', 0.05
     robot = '--urdf', robot_arm.URDF, '--tip-link', 'tool0', '--part-pose', *PART_POSE
-    done = paint('plan', *part, '--model', model, '--speed', 0.2, *robot, '-o', tmp_path / 'plan')
+    asked = '--model', model, '--speed', 0.2, '--frame-id', 'cell'
+    done = paint('plan', *part, *asked, *robot, '-o', tmp_path / 'plan')
     assert done.returncode == 0, done.stderr
     assert 'driven as planned' in done.stdout
     figures = json.loads((tmp_path / 'plan/plan.json').read_text())['robot']
@@ -227,6 +228,8 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
     done = paint('improve', *part, *given, '--model', model, '-o', tmp_path / 'better')
     assert done.returncode == 0, done.stderr
     assert (tmp_path / 'better/joints.csv').exists()
+    better = pd.read_recording(tmp_path / 'better/trajectory', part_pose=PART_POSE)
+    assert better.read_in == 'cell'
     grid = '--x', 0.9, 1.0, '--y', 0.0, 0.05
     done = paint('place', *given, *grid, '-o', tmp_path / 'place', '--json')
     assert done.returncode == 0, done.stderr

@@ -198,6 +198,11 @@ def improve(
         # A gun whose mean direction is shorter paints more sides than one.
         if (length := np.linalg.norm(towards)) >= 0.9:
             target_region &= painted_side(surface, towards / length)
+    if not target_region.any():
+        raise PlanError(
+            f'{trajectory.source}: nowhere does the gun face what it paints; check its axis '
+            '(--tool-axis) and where the part stands (--part-pose), paint inspect draws both'
+        )
     sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
     if sought.target_um is None:
         mean_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])

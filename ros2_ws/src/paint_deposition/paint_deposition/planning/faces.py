@@ -110,7 +110,8 @@ def plan_faces(
 
     What faces away from ``request.outward``, if given, stays bare. To optimise is to choose the
     speeds along all passes, and where the gun opens and closes, for an even film on all faces
-    together. Normals of a face turn from its mean by ``widest_rad`` at the most.
+    together. Normals of a face turn from its mean by ``widest_rad`` at the
+    most, but for 5 % of the area and small patches that go with a neighbour.
 
     Raises:
         PlanError: a face has no passes, or the film is less even than the tolerance.
@@ -122,7 +123,10 @@ def plan_faces(
         # Faces that turn further from the side of the gun are its back.
         faces = tuple(face for face in faces if face.surface.outward @ side > -0.1)
         if not faces:
-            raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
+            raise PlanError(
+                f'no face looks to a gun at {" ".join(f"{one:.2g}" for one in side)} of the part; '
+                'give another direction to the gun (outward)'
+            )
     painted = np.zeros(len(surface.vertices_m), dtype=bool)
     painted[np.concatenate([face.vertices for face in faces])] = True
     wanted = WantedFilm.of(surface, painted, request.target_um, zones)

@@ -185,9 +185,11 @@ class Improvement:
         pairs = list(zip(original.openings, improved.openings, strict=True))
         found: list[PassChange] = []
         for (begin, end), number in zip(ends_m[begins_pass], numbers[begins_pass], strict=True):
+            # Less of an opening, or of a short pass or opening, is of its neighbour [m].
             own = [
                 (before, after) for before, after in pairs
-                if min(after.off_m, end) - max(after.on_m, begin) > 0.05
+                if min(after.off_m, end) - max(after.on_m, begin)
+                > min(0.05, 0.3 * (after.off_m - after.on_m), 0.3 * (end - begin))
             ]  # fmt: skip
             if not own:
                 continue

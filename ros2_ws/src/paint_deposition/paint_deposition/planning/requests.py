@@ -24,7 +24,7 @@ class FilmBuild(Request):
         least=SLOWEST_M_PER_S, most=FASTEST_M_PER_S,
     )  # fmt: skip
     target_um: float | None = given(
-        None, 'Mean film build; the speed is chosen for it if it is not given [µm].', above=0.0
+        None, 'Mean film wanted; without --speed the speed is chosen for it [µm].', above=0.0
     )
 
 
@@ -33,14 +33,14 @@ class PassRequest(FilmBuild):
 
     index_min_m: float | None = given(
         None,
-        'Least index [m]; default: 0.2, of an unusual SB50 0.35 of it.',
+        'Least index [m]; default: 0.2; where SB50 is outside 0.25 to 0.75 m, 0.35 of it.',
         '--index-min',
         least=0.001,
         most=10.0,
     )
     index_max_m: float | None = given(
         None,
-        'Greatest index [m]; default: 0.8, of an unusual SB50 1.4 of it.',
+        'Greatest index [m]; default: 0.8; where SB50 is outside 0.25 to 0.75 m, 1.4 of it.',
         '--index-max',
         least=0.001,
         most=10.0,
