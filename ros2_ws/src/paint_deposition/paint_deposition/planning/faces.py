@@ -124,8 +124,8 @@ def plan_faces(
         faces = tuple(face for face in faces if face.surface.outward @ side > -0.1)
         if not faces:
             raise PlanError(
-                f'no face looks to a gun at {" ".join(f"{one:.2g}" for one in side)} of the part; '
-                'give another direction to the gun (outward)'
+                f'no surface faces the gun at {" ".join(f"{one:.2g}" for one in side)} from the '
+                'part; give another direction to it (outward)'
             )
     painted = np.zeros(len(surface.vertices_m), dtype=bool)
     painted[np.concatenate([face.vertices for face in faces])] = True

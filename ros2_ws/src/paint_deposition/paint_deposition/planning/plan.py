@@ -334,7 +334,7 @@ def kept_clear(planned: Planned, envelope: GunEnvelope) -> Planned:
     if touched and not planned.request.allow_contact:
         raise PlanError(
             f'{max(touched, key=lambda contact: contact.depth_m)}; give a greater standoff_m or '
-            'smoothing_radius_m or another side (outward); `paint plan` can plan face by face '
-            '(--faces auto) or keep it (--allow-contact)'
+            'smoothing_radius_m, another side (outward), or plan it face by face with `paint plan '
+            '--faces auto`, of which allow_contact keeps it'
         )
     return replace(planned, contacts=found, envelope=envelope)

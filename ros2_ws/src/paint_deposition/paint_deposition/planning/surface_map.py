@@ -53,8 +53,8 @@ class SurfaceMap:
         self.painted = painted_side(surface, axes[2])
         if not self.painted.any():
             raise PlanError(
-                f'no surface faces a gun at {" ".join(f"{one:.2g}" for one in axes[2])} of the '
-                'part; give another direction to the gun (outward)'
+                f'no surface faces the gun at {" ".join(f"{one:.2g}" for one in axes[2])} '
+                'from the part; give another direction to it (outward)'
             )
         self.surface_m = (surface.vertices_m[self.painted] - self.origin_m) @ axes.T
         facing = surface.normals @ axes[2]
