@@ -17,6 +17,7 @@ from paint_deposition.api.planning import place, read_robot
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.part_frame import Rigid, at_part, moved
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.joints import JointPace, starts
 from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import driven, plan
@@ -137,6 +138,20 @@ def test_a_turn_beside_the_passes_slows_itself_only(cell):
     rates = np.diff(speeds, axis=0) / np.diff(seconds)[:, np.newaxis]
     assert (np.abs(rates) <= 1.001 * most).all()
     assert reached_s[-1] < 1.3 * times_s[-1]
+
+
+def test_a_motion_that_is_slowed_down_has_no_gaps(planned, cell):
+    """Poses 80 ms apart are nearly a second apart at a tenth of their speed."""
+    dense = planned.trajectory
+    columns = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
+    few = replace(dense, **{name: getattr(dense, name)[::20] for name in columns})
+    slow = replace(cell, arm=replace(cell.arm, fastest=0.05 * cell.arm.fastest))
+    drive = slow.drive(few, free_roll=False)
+    assert drive.limits
+    path, counts = spray_path(drive.trajectory)
+    assert counts.gaps == 0
+    travel_m = [(p.dwell_s * p.speed_m_per_s)[p.flow > 0].sum() for p in (path, planned.path)]
+    assert travel_m[0] == pytest.approx(travel_m[1], rel=0.01)
 
 
 def test_the_tool_rolls_where_its_pattern_is_round_only(planned, cell, on_robot):
