@@ -139,6 +139,9 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
         (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 'nan', 0), 'nan is not finite'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 0, 0), 'give a direction'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--down', 'nan', 0, 0), 'nan is not finite'),
+        (('--mesh', 'door.stl', '--speed', 0.3, '--tip', 'tool0'), '--tip goes with a robot'),
+        (('--mesh', 'door.stl', '--speed', 0.3, '--face-angle-deg', 30), 'give --faces auto'),
+        (('--mesh', 'door.stl', '--speed', 0.3, '--time-weight', 0), 'is for --optimise'),
     ],
 )
 def test_impossible_plans_are_refused(arguments, words, tmp_path):
@@ -159,7 +162,8 @@ def folded(tmp_path):
 def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(folded, tmp_path):
     options = ('--faces', 'auto', '--target-um', 20, '--max-edge-length-m', 0.06, '--json')
     plans = []
-    for more in (('--keep-off-m', 0.4), ('--optimise',)):
+    free = '--optimise', '--paint-weight', 0, '--time-weight', 0
+    for more in (('--keep-off-m', 0.4), free):
         done = ran('plan', '--mesh', folded, *options, *more, '-o', tmp_path / 'plan')
         plans.append(json.loads(done.stdout))
         near = 'warning: the part is too near before the gun at (' in done.stderr
@@ -226,6 +230,8 @@ def test_the_film_is_that_of_the_written_files(improved):
         (('--flow', 0, 1), ('--flow', '0.0')),
         (('--acceleration', 'fast'), ('fast',)),
         (('--gun-signal', 'doGun'), ('--gun-signal is for RAPID modules',)),
+        (('--joint-acceleration', 2), ('--joint-acceleration goes with a robot; give --urdf',)),
+        (('--urdf', SAMPLES / 'robot.urdf'), ('--urdf needs --part-pose',)),
     ],
 )
 def test_refusals(more, words, tmp_path):
@@ -313,5 +319,7 @@ def test_without_a_trajectory_passes_are_planned(tmp_path):
     assert np.mean(films) == pytest.approx(25.0, rel=0.2)
 
 
-def test_a_part_that_nobody_paints_is_refused(tmp_path):
+def test_a_part_that_nobody_paints_or_two_ways_is_refused(tmp_path):
     assert_refused(paint('measure', *UNPAINTED, '-o', tmp_path), '--trajectory', '--target-um')
+    for more in (('--target-um', 20), ('--brush', 2)):
+        assert_refused(paint('measure', *PAINTED, *more, '-o', tmp_path), 'leave one of them out')

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 from rosbags.highlevel import AnyReader
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
@@ -17,9 +17,11 @@ from paint_deposition.api.planning import place, read_robot
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.part_frame import Rigid, at_part, moved
-from paint_deposition.planning.joints import starts
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.planning.joints import JointPace, starts
 from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import driven, plan
+from paint_deposition.planning.programme import Programme
 from paint_deposition.planning.requests import PlanRequest
 from planning.test_surface_map import sheet
 from scenes import painted
@@ -109,6 +111,49 @@ def test_a_slow_joint_slows_its_passes_each_as_a_whole(planned, cell, on_robot):
     assert speed.mean() == pytest.approx(0.2 * limits[0].share, rel=0.02)
 
 
+def test_an_improvement_is_that_which_the_robot_drives(planned, cell):
+    better = pd.improve(
+        planned.surface, planned.trajectory, ROUND, robot=replace(cell, acceleration=0.3)
+    )
+    assert better.drive.limits
+    assert 'bound by the joints' in better.warnings[-1]
+    clock = Programme.of(better.trajectory)
+    for change in better.changes:
+        seconds = np.diff(clock.seconds_at(np.array(change.place_m)))[0]
+        assert change.speed_m_per_s[1] == pytest.approx(np.ptp(change.place_m) / seconds, rel=0.01)
+
+
+def test_a_turn_beside_the_passes_slows_itself_only(cell):
+    """A joint turns back between two passes, at 1/20 of the acceleration that this needs."""
+    times_s = np.arange(0.0, 4.001, 0.02)
+    turned = 0.5 * np.abs(times_s[:, np.newaxis] - 2.0) * np.eye(6)[0]
+    most = np.full(6, 2.5)
+    pace = JointPace(cell.arm, times_s, CubicSpline(times_s, turned), most)
+    spray_pass = np.select([times_s < 1.5, times_s > 2.5], [0, 1], -1)
+    shares = pace.shares(spray_pass)
+    reached_s, seconds, _, speeds, over = pace.driven(shares)
+    assert shares[spray_pass >= 0] == pytest.approx(1.0)
+    assert pace.limits(spray_pass, shares) == ()
+    assert over.max() <= 1.0
+    rates = np.diff(speeds, axis=0) / np.diff(seconds)[:, np.newaxis]
+    assert (np.abs(rates) <= 1.001 * most).all()
+    assert reached_s[-1] < 1.3 * times_s[-1]
+
+
+def test_a_motion_that_is_slowed_down_has_no_gaps(planned, cell):
+    """Poses 80 ms apart are nearly a second apart at a tenth of their speed."""
+    dense = planned.trajectory
+    columns = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
+    few = replace(dense, **{name: getattr(dense, name)[::20] for name in columns})
+    slow = replace(cell, arm=replace(cell.arm, fastest=0.05 * cell.arm.fastest))
+    drive = slow.drive(few, free_roll=False)
+    assert drive.limits
+    path, counts = spray_path(drive.trajectory)
+    assert counts.gaps == 0
+    travel_m = [(p.dwell_s * p.speed_m_per_s)[p.flow > 0].sum() for p in (path, planned.path)]
+    assert travel_m[0] == pytest.approx(travel_m[1], rel=0.01)
+
+
 def test_the_tool_rolls_where_its_pattern_is_round_only(planned, cell, on_robot):
     lopsided = pd.DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.3))
     kept = driven(plan(planned.surface, lopsided, PlanRequest(speed_m_per_s=0.2), 'part'), cell)
@@ -180,7 +225,8 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
     pd.write_model(model, ROUND)
     part = '--mesh', tmp_path / 'flat.stl', '--max-edge-length-m', 0.05
     robot = '--urdf', robot_arm.URDF, '--tip-link', 'tool0', '--part-pose', *PART_POSE
-    done = paint('plan', *part, '--model', model, '--speed', 0.2, *robot, '-o', tmp_path / 'plan')
+    asked = '--model', model, '--speed', 0.2, '--frame-id', 'cell'
+    done = paint('plan', *part, *asked, *robot, '-o', tmp_path / 'plan')
     assert done.returncode == 0, done.stderr
     assert 'driven as planned' in done.stdout
     figures = json.loads((tmp_path / 'plan/plan.json').read_text())['robot']
@@ -197,6 +243,8 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
     done = paint('improve', *part, *given, '--model', model, '-o', tmp_path / 'better')
     assert done.returncode == 0, done.stderr
     assert (tmp_path / 'better/joints.csv').exists()
+    better = pd.read_recording(tmp_path / 'better/trajectory', part_pose=PART_POSE)
+    assert better.read_in == 'cell'
     grid = '--x', 0.9, 1.0, '--y', 0.0, 0.05
     done = paint('place', *given, *grid, '-o', tmp_path / 'place', '--json')
     assert done.returncode == 0, done.stderr

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from booth import LOOKING_ALONG_Y
@@ -21,6 +22,7 @@ from paint_deposition.part.zones import Box, Zone, Zones
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import ImproveRequest, PlanRequest
+from paint_deposition.report.pictures.planning import write_improvement_picture
 from planning.test_surface_map import sheet
 from scenes import stamps_ns, straight_pass
 
@@ -144,7 +146,7 @@ def test_a_mean_that_the_limits_do_not_allow_is_warned_of(panel, even):
     assert slow.after.mean_um > 1.1 * slow.retiming.target_um
     (warning,) = slow.warnings
     assert 'the greatest speed' in warning
-    assert 'allow a greater speed (speed_max_m_per_s) or a lower flow' in warning
+    assert 'allow a greater speed (--speed-max) or a lower flow (--flow)' in warning
 
 
 @pytest.mark.slow
@@ -205,6 +207,9 @@ def test_openings_end_where_the_brush_changes_also_between_poses_and_moves_keep_
     assert opened == [(1.0, 1), (1.0, 2), (0.5, 2)]
     moves = [(m.flow, m.brush) for m in moves_of(programme, ImproveRequest()) if m.spraying]
     assert list(dict.fromkeys(moves)) == [(1.0, 1), (1.0, 2), (0.5, 2)]
+    # The first pose, left from standstill, is come to as fast as the gun is opened.
+    from_rest = replace(programme, duration_s=np.append(4.0, programme.duration_s[1:]))
+    assert moves_of(from_rest, ImproveRequest())[0].speed_m_per_s == pytest.approx(0.3)
     # Two openings meet where no pose is: none takes no time.
     flows = switched(stamps_ns([0.503, 1.507, 2.0]), (1, 1), (1, 2), (0, 0))
     programme = Programme.of(replace(SWITCHED, **flows))
@@ -212,6 +217,25 @@ def test_openings_end_where_the_brush_changes_also_between_poses_and_moves_keep_
     spraying = [m for m in moves_of(programme, ImproveRequest()) if m.spraying]
     assert list(dict.fromkeys(m.brush for m in spraying)) == [1, 2]
     assert max(m.speed_m_per_s for m in spraying) < 0.301
+
+
+@pytest.mark.slow
+def test_a_short_pass_is_a_change_and_a_gun_that_looks_along_the_part_is_refused(tmp_path):
+    small = sheet(lambda x, z: 0.0 * x, half_m=0.05)
+
+    def over(quaternion, y_m):
+        places = [np.array([x, y_m, 0.0]) for x in (-0.1, -0.02, 0.02, 0.1)]
+        return timed(
+            [Move(at, quaternion, 0.1, spraying=k == 2) for k, at in enumerate(places)],
+            gun_known=True,
+        )
+
+    found = pd.improve(small, over(LOOKING_ALONG_Y, -0.25), NARROW, trigger_shift_m=0.0)
+    assert [change.number for change in found.changes] == [1]
+    assert write_improvement_picture(tmp_path / 'improvement.png', found).exists()
+    aside = Rotation.from_euler('z', -80.0, degrees=True) * Rotation.from_quat(LOOKING_ALONG_Y)
+    with pytest.raises(PlanError, match='nowhere does the gun face what it paints'):
+        pd.improve(small, over(aside.as_quat(), -0.04), NARROW)
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -49,6 +50,8 @@ def test_film_is_what_a_simulation_of_the_motion_gives(bowed, planned):
         ({'target_um': 20.0}, []),
         ({'target_um': 16.0, 'speed_m_per_s': 0.3}, ['mean film will be 20.0 µm, not the target']),
         ({'target_um': 20.0, 'speed_max_m_per_s': 0.11}, ['to 0.11 m/s are allowed']),
+        ({'target_um': 25.0}, ['mean film will be 20.0 µm, not the target of 25 µm']),
+        ({'target_um': 25.0, 'optimise': True}, [r'allow other speeds (--speed-min']),
     ],
 )
 def test_what_was_asked_for_and_is_not_reached_is_warned_of(planned, wanted, words):
@@ -67,6 +70,7 @@ def test_placing_beats_the_plane_s_recommendation_and_neighbouring_indices(plann
         np.testing.assert_allclose(np.diff(other.lines_m('horizontal')), beside, atol=1e-9)
         assert other.sigma_n > 0.97 * planned.placement.sigma_n
     assert 0.22 <= place_passes(films, across, (0.22, 0.3)).index_m <= 0.3
+    assert place_passes(films, across, (5.0, 5.0)).index_m == 5.0
 
 
 def test_on_a_wide_plane_the_plan_is_as_even_as_the_recommendation():
@@ -93,13 +97,20 @@ def test_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it_or_run_downward
     [
         ({'speed_m_per_s': None}, 'neither speed_m_per_s nor target_um'),
         ({'tolerance': 0.05, 'index_m': 0.3}, 'on this part within 5 %; the closest is'),
+        ({'tolerance': 0.1415, 'index_m': 0.3}, 'of sigma_n 14.17 %, not within 14.15 %'),
+        (
+            {'tolerance': 0.1, 'index_m': 0.2, 'optimise': True},
+            r'within 10 %; the closest is .* at 0\.200 m',
+        ),
+        ({'index_m': 0.2, 'index_min_m': 0.25}, 'index_m is 0.2, beyond index_min_m, 0.25'),
+        ({'target_um': 2e4, 'speed_m_per_s': None}, 'give another target or index'),
         ({'overspray_m': -0.1}, 'overspray_m is -0.1'),
         ({'direction': 'up'}, "'horizontal' or 'vertical'"),
     ],
 )
 def test_impossible_plans_say_why(bowed, what, words):
     with pytest.raises(PlanError, match=words) as refusal:
-        plan(bowed, NARROW, PlanRequest(**({'speed_m_per_s': 0.3} | what)))
+        pd.plan(bowed, NARROW, **({'speed_m_per_s': 0.3} | what))
     assert '\n' not in str(refusal.value)
 
 

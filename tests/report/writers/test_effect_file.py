@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import LEARNED, load_effect_file
@@ -26,6 +27,7 @@ from paint_deposition.report.writers.inference import (
     write_effect_file,
     write_fitted,
 )
+from paint_deposition.report.writers.plans import gauge_turns
 from paint_deposition.report.writers.write import write_film
 from small_campaign import small_campaign
 
@@ -199,3 +201,12 @@ def test_the_file_gives_the_fitted_film(file: Path, fitted):
     assert (
         np.abs(film_on_vertices_um(pd.read_model(file)) - expected).max() < 1e-6 * expected.max()
     )
+
+
+def test_the_gauge_stands_level_also_on_faces_square_to_the_front():
+    normals = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.6, -0.8, 0.0]])
+    turns = gauge_turns(normals, outward=normals[0], down=np.array([0.0, 0.0, -1.0]))
+    axes = Rotation.from_quat(turns).as_matrix()
+    np.testing.assert_allclose(axes[:, :, 2], -normals, atol=1e-12)
+    np.testing.assert_allclose(axes[:, 2, 0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(axes[[0, 3], :, 0], [[1.0, 0.0, 0.0], [0.8, 0.6, 0.0]], atol=1e-12)

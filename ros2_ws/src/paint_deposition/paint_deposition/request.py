@@ -123,8 +123,8 @@ class DrivingRobot(RobotArm):
     """A robot that is to drive a motion."""
 
     joint_acceleration: float | None = given(
-        None, 'Of every joint of a robot that is to drive the motion [rad/s2 or m/s2]; default: '
-        'full speed in a quarter of a second.', above=0.0,
+        None, 'Greatest acceleration of every joint of a robot that is to drive the motion '
+        '[rad/s2 or m/s2]; default: full speed in a quarter of a second.', above=0.0,
     )  # fmt: skip
 
 

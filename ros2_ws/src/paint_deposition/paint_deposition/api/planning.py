@@ -198,6 +198,11 @@ def improve(
         # A gun whose mean direction is shorter paints more sides than one.
         if (length := np.linalg.norm(towards)) >= 0.9:
             target_region &= painted_side(surface, towards / length)
+    if not target_region.any():
+        raise PlanError(
+            f'{trajectory.source}: nowhere does the gun face what it paints; check its axis '
+            '(--tool-axis) and where the part stands (--part-pose), paint inspect draws both'
+        )
     sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
     if sought.target_um is None:
         mean_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])
@@ -206,13 +211,13 @@ def improve(
     if posterior is not None:
         models += draw_models(model, posterior, 8, seed)
     retiming = retime_for_evenness(surface, sought, original, models, request, progress)
-    programme, drive = retiming.programme, None
+    drive = None
     if robot:
-        drive = robot.drive(programme.trajectory(), free_roll=False, begin=begin)
-        programme = Programme.of(drive.trajectory)
-    moves = moves_of(programme, request)
+        drive = robot.drive(retiming.programme.trajectory(), free_roll=False, begin=begin)
+        retiming = replace(retiming, programme=Programme.of(drive.trajectory))
+    moves = moves_of(retiming.programme, request)
     progress('the film as it will be', 0.0)
-    improved = programme.trajectory()
+    improved = retiming.programme.trajectory()
     new_um, new_paint = simulated(surface, model, improved)
     program_um, _ = simulated(surface, model, timed(moves, gun_known=True))
     tolerance = request.tolerance or DEFAULT_TOLERANCE

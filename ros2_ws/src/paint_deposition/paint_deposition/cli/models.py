@@ -121,6 +121,11 @@ def model_words(path: Path, file: ModelFile) -> str:
 def robot_cell(robot: dict[str, Any], part_pose: list[float] | None) -> RobotCell | None:
     """The robot of ``options.robot_options`` with the part; None where none is given."""
     if robot['urdf'] is None:
+        names = {'tip_link': '--tip', 'base_link': '--base'}
+        for name, value in robot.items():
+            if value is not None:
+                option = names.get(name, f'--{name.replace("_", "-")}')
+                raise click.UsageError(f'{option} goes with a robot; give --urdf')
         return None
     if part_pose is None:
         raise click.UsageError('--urdf needs --part-pose: where the part stands in its base')

@@ -75,8 +75,8 @@ def recommend_command(
     'with its flange or a bumper, and blend their seams.',
 )  # fmt: skip
 @click.option(
-    '--face-angle-deg', default=40.0, show_default=True, type=options.FiniteRange(5.0, 75.0),
-    help='Largest angle between a normal of a face and their mean.',
+    '--face-angle-deg', show_default='40', type=options.FiniteRange(5.0, 75.0),
+    help='With --faces auto: largest angle between a normal of a face and their mean.',
 )  # fmt: skip
 @options_of(GunEnvelope, into='envelope')
 @PAINT_MOVES
@@ -91,7 +91,7 @@ def plan_command(
     part_pose: list[float] | None,
     frame_id: str | None,
     faces: str,
-    face_angle_deg: float,
+    face_angle_deg: float | None,
     paint_moves: bool,
     results: Results,
 ) -> None:
@@ -101,6 +101,14 @@ def plan_command(
     """
     chosen, cell = chosen_model(model_file, brush=brush), robot_cell(robot, part_pose)
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
+    if faces == 'one' and face_angle_deg is not None:
+        raise click.UsageError('--face-angle-deg is for faces; give --faces auto')
+    usual = PlanRequest.model_fields
+    for name in ('paint_weight', 'time_weight'):
+        given_it = getattr(request, name) != usual[name].default
+        if given_it and not (request.optimise or part.zones_file):
+            option = name.replace('_', '-')
+            raise click.UsageError(f'--{option} is for --optimise; give that too, or leave it out')
     with Progress('plan') as show:
         show('reading the mesh')
         surface = part.surface()
@@ -112,12 +120,13 @@ def plan_command(
         if faces == 'one':
             result = pd.plan(surface, chosen.model, **given)
         else:
-            given['face_angle_deg'] = face_angle_deg
+            if face_angle_deg is not None:
+                given['face_angle_deg'] = face_angle_deg
             result = pd.plan_faces(surface, chosen.model, **given)
         show('writing')
         made_from = {
-            **inputs(mesh=part.mesh, zones_file=part.zones_file),
-            'model': str(model_file or 'default'), 'frame_id': frame_id, 'part_pose': part_pose,
+            **inputs(mesh_file=part.mesh, model_file=model_file, zones_file=part.zones_file),
+            'frame_id': frame_id, 'part_pose': part_pose,
         }  # fmt: skip
         results.write(
             result, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
@@ -201,8 +210,11 @@ def improve_command(
         chosen, part_pose = model_for(model_file, trajectory), motion['part_pose']
         robot = {name: motion[name] for name in ('urdf', 'tip_link', 'base_link')}
         limits = {'joint_acceleration': joint_acceleration}
-        cell = robot_cell(robot | limits, part_pose) if part_pose else None
-        known = motion if holds_joints(trajectory) else motion | dict.fromkeys(robot)
+        joints = holds_joints(trajectory)
+        # Of recorded joints the URDF may be meant for reading them only.
+        drives = part_pose or joint_acceleration or not joints
+        cell = robot_cell(robot | limits, part_pose) if drives else None
+        known = motion if joints else motion | dict.fromkeys(robot)
         recorded = pd.read_recording(trajectory, **known)
         show('refining the mesh')
         result = pd.improve(
@@ -216,7 +228,10 @@ def improve_command(
             'rivals': [str(path) for path in rivals], 'part_pose': part_pose,
         }  # fmt: skip
         show('writing and drawing')
-        results.write(result, made_from=made_from, part_pose=part_pose, paint_moves=paint_moves)
+        results.write(
+            result, made_from=made_from, part_pose=part_pose,
+            frame_id=recorded.read_in or 'base_link', paint_moves=paint_moves,
+        )  # fmt: skip
     notes = (*result.surface.notes, *recorded.notes, *result.notes)
     results.print(_improvement_lines(result), chosen.words, notes, result.warnings)
 

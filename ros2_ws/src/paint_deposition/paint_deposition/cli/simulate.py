@@ -278,6 +278,11 @@ def measure_command(
             'no motion is given; give --trajectory, or --target-um for passes '
             'as `plan` would lay them'
         )
+    if trajectory is not None and (brush or passes != FilmBuild()):
+        raise click.UsageError(
+            '--target-um, --speed and --brush are of planned passes, --trajectory gives others; '
+            'leave one of them out'
+        )
     with Progress('measure') as show:
         show('reading')
         surface = part.surface()

@@ -220,6 +220,7 @@ def _robot(path: Path, source: MotionSource) -> 'Robot | None':
 def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) -> Trajectory:
     """Transform by the given pose of the part, else by the transforms of the recording."""
     named, part = recorded.frame_id, source.frame_id or PART
+    recorded = replace(recorded, read_in=named)
     if source.part_pose is not None and not recorded.frames:
         if source.frame_id and named and is_frame(named, part):
             raise RecordingError(

@@ -207,6 +207,7 @@ class Trajectory:
         notes, warnings: remarks for the user, and what is likely wrong, a line each.
         source: the file it came from, for messages.
         settings: of the process while the gun sprayed, by name; empty where not recorded.
+        read_in: frame of the poses before they were brought to that of the part.
 
     Raises:
         RecordingError: the arrays do not have these shapes.
@@ -225,6 +226,7 @@ class Trajectory:
     trigger_brush: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     trigger_rows: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     frames: tuple[str, ...] = ()
+    read_in: str = ''
 
     def __repr__(self) -> str:
         return f'Trajectory({len(self)} poses over {self.duration_s:.1f} s)'

@@ -128,7 +128,7 @@ class IndexPlanner(PaintNode):
             answer = recommend(self._selected_model(), index_request)
         except (PaintError, MemoryError) as error:
             self._last = Status(WARN, str(error) or 'not enough memory')
-            response.message = str(error)
+            response.message = self._last.message
             return response
         self._last = Status(OK, answer.sentence)
         return _fill_response(response, answer)
@@ -162,6 +162,8 @@ class IndexPlanner(PaintNode):
             plan(surface, self._selected_model(), request, frame_id, progress), GunEnvelope()
         )
         self.get_logger().info(planned.sentence)
+        for warning in planned.warnings:
+            self.get_logger().warning(warning)
         path = _path_message(planned.trajectory, self.get_clock().now().nanoseconds)
         self._path_publisher.publish(path)
         return planned, path

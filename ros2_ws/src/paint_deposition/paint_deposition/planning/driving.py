@@ -12,7 +12,7 @@ from paint_deposition.errors import PlanError
 from paint_deposition.motion.arm import Arm
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory, gap_ns
 from paint_deposition.planning.joints import (
     MARGIN,
     REACHED,
@@ -121,12 +121,13 @@ class RobotCell:
             near = np.abs(at_s[nearest] - times_s) <= 0.5 * sprayed.dwell_s[nearest] + STEP_S
             spray_pass[near] = sprayed.spray_pass[nearest][near]
         shares = pace.shares(spray_pass)
-        reached_s, seconds, driven, speeds = pace.driven(shares)
+        reached_s, seconds, driven, speeds, _ = pace.driven(shares)
 
         def slowed_ns(stamps_ns: np.ndarray) -> np.ndarray:
             later_s = np.interp(1e-9 * (stamps_ns - first_ns), times_s, reached_s)
             return first_ns + np.round(1e9 * later_s).astype(np.int64)
 
+        trajectory = _without_gaps(trajectory, slowed_ns(trajectory.stamps_ns))
         turns = Rotation.from_quat(trajectory.quaternions_xyzw) * rolled(begun[1])
         slowed = replace(
             trajectory,
@@ -195,6 +196,27 @@ class RobotCell:
         clock_s = 1e-9 * (in_base.stamps_ns - in_base.stamps_ns[0])
         turns = Slerp(clock_s, Rotation.from_quat(in_base.quaternions_xyzw))
         return PchipInterpolator(clock_s, in_base.positions_m)(times_s), turns(times_s)
+
+
+def _without_gaps(trajectory: Trajectory, reached_ns: np.ndarray) -> Trajectory:
+    """The motion with more poses where those at their new times (N,) [ns] would be gaps."""
+    # Half of what is a gap, in which the gun is off.
+    count = np.ceil(np.diff(reached_ns) / (0.5 * gap_ns(DEFAULT_MAX_POSE_GAP_S))).astype(int)
+    count = np.maximum(count, 1)
+    if count.max(initial=1) == 1:
+        return trajectory
+    number = np.append(0, np.cumsum(count))
+    row = np.interp(np.arange(number[-1] + 1), number, np.arange(len(number)))
+    rows, turns = np.arange(len(number)), Rotation.from_quat(trajectory.quaternions_xyzw)
+    first_ns = trajectory.stamps_ns[0]
+    since_ns = np.rint(np.interp(row, rows, trajectory.stamps_ns - first_ns)).astype(np.int64)
+    places = [np.interp(row, rows, column) for column in trajectory.positions_m.T]
+    return replace(
+        trajectory,
+        stamps_ns=first_ns + since_ns,
+        positions_m=np.stack(places, axis=1),
+        quaternions_xyzw=Slerp(rows, turns)(row).as_quat(),
+    )
 
 
 def _words(place_m: np.ndarray) -> str:

@@ -36,6 +36,7 @@ from paint_deposition.planning.planned_film import (
     contacts,
     evenness,
     predicted,
+    simulated,
 )
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
@@ -90,7 +91,6 @@ class PartPlan(PlannedFilm):
                 {'area_m2': face.surface.area_m2, 'outward': face.surface.outward.tolist()}
                 for face in self.faces
             ],
-            'speeds_m_per_s': [planned.speed_m_per_s for planned in self.passes],
             'margin_m': self.margin_m,
             'sigma_n_unblended': self.sigma_n_unblended,
         }  # fmt: skip
@@ -110,7 +110,8 @@ def plan_faces(
 
     What faces away from ``request.outward``, if given, stays bare. To optimise is to choose the
     speeds along all passes, and where the gun opens and closes, for an even film on all faces
-    together. Normals of a face turn from its mean by ``widest_rad`` at the most.
+    together. Normals of a face turn from its mean by ``widest_rad`` at the
+    most, but for 5 % of the area and small patches that go with a neighbour.
 
     Raises:
         PlanError: a face has no passes, or the film is less even than the tolerance.
@@ -122,7 +123,10 @@ def plan_faces(
         # Faces that turn further from the side of the gun are its back.
         faces = tuple(face for face in faces if face.surface.outward @ side > -0.1)
         if not faces:
-            raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
+            raise PlanError(
+                f'no surface faces the gun at {" ".join(f"{one:.2g}" for one in side)} from the '
+                'part; give another direction to it (outward)'
+            )
     painted = np.zeros(len(surface.vertices_m), dtype=bool)
     painted[np.concatenate([face.vertices for face in faces])] = True
     wanted = WantedFilm.of(surface, painted, request.target_um, zones)
@@ -137,7 +141,17 @@ def plan_faces(
         running, frame_id, lambda way: not contacts(surface, way, envelope)
     )
     if request.optimise:
-        asked = request.improvement(running[0][0].style.overspray_m, request.target_um)
+        target_um = wanted.target_um
+        if target_um is None:
+            area_m2, (film_um, _) = surface.vertex_areas_m2, simulated(surface, model, trajectory)
+            target_um, _ = evenness(film_um[painted], area_m2[painted])
+        wanted_cm3 = target_um * float(surface.vertex_areas_m2[wanted.region].sum())
+        start_s = sum(one.sprayed_m / one.speed_m_per_s for face in running for one in face)
+        asked = request.improvement(
+            running[0][0].style.overspray_m, request.target_um,
+            paint=model.planar.K1_cm3_per_s * start_s / wanted_cm3,
+            time=start_s / trajectory.duration_s,
+        )  # fmt: skip
         retimed = retime_for_evenness(
             surface, wanted, Programme.of(trajectory), [model], asked, progress, explain=False
         ).programme

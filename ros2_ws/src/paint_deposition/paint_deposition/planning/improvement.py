@@ -135,12 +135,12 @@ class Improvement:
     Attributes:
         surface: the part. wanted: the film on the side where it counts.
         model: what the gun sprays. request: objective and limits.
-        original: the motion as it was; trajectory: the improved one as its bag was read back.
+        original: the motion as it was; trajectory: the improved one.
         moves: the improved one as moves of a robot program.
         retiming: how it was found.
         before, after: films of both motions.
         program_difference: largest difference between the films of the robot program and of the
-            bag, both read back, as a share of the greatest film.
+            bag, as a share of the greatest film.
         geometry_warnings: oddities of the motion over the part, each with its likely cause.
         drive: of the robot that it was made for.
     """
@@ -185,9 +185,11 @@ class Improvement:
         pairs = list(zip(original.openings, improved.openings, strict=True))
         found: list[PassChange] = []
         for (begin, end), number in zip(ends_m[begins_pass], numbers[begins_pass], strict=True):
+            # Less of an opening, or of a short pass or opening, is of its neighbour [m].
             own = [
                 (before, after) for before, after in pairs
-                if min(after.off_m, end) - max(after.on_m, begin) > 0.05
+                if min(after.off_m, end) - max(after.on_m, begin)
+                > min(0.05, 0.3 * (after.off_m - after.on_m), 0.3 * (end - begin))
             ]  # fmt: skip
             if not own:
                 continue
@@ -222,19 +224,20 @@ class Improvement:
         off = self.after.mean_um / target_um - 1.0
         # A mean film further from the target than this share gives a warning.
         if abs(off) > 0.02:
-            thick = off > 0.0
+            thick, slowed = off > 0.0, bool(self.drive and self.drive.limits)
             other = (SLOWEST,) if thick else (FASTEST, BEND, LEAD, JOINT)
             names = [name for name in self.retiming.binding if name not in other]
-            remedy = (
-                'a greater speed (speed_max_m_per_s) or a lower flow (flow)'
-                if thick
-                else 'a lower speed (speed_min_m_per_s) or a greater flow (flow)'
-            )
+            remedy = 'allow a lower speed (--speed-min) or a greater flow (--flow)'
+            if thick and slowed:
+                names = ['the joints that slow its passes down']
+                remedy = 'let the part stand elsewhere, paint place shows where'
+            elif thick:
+                remedy = 'allow a greater speed (--speed-max) or a lower flow (--flow)'
             found.append(
                 f'the mean film is {self.after.mean_um:.1f} µm instead of {target_um:.1f}, '
                 f'bound by {" and ".join(names) or "the path"}; '
                 f'{100 * self.before.within:.0f} → {100 * self.after.within:.0f} % of the area '
-                f'within the tolerance; allow {remedy}'
+                f'within the tolerance; {remedy}'
             )
         # The films of bag and robot program should agree to this share of the peak.
         if self.program_difference > 2e-3:

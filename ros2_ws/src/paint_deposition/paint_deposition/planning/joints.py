@@ -170,11 +170,27 @@ class JointPace:
     def shares(self, spray_pass: np.ndarray) -> np.ndarray:
         """(N,) share of the planned speed at the times, the greatest that the joints allow.
 
-        Of each time (N,) the number of its pass is given, -1 between passes.
+        Of each time (N,) the number of its pass is given, -1 between passes. A pass keeps one
+        share, or its film would be uneven.
+
+        Raises:
+            PlanError: the joints hardly allow any speed.
+        """
+        room = np.ones(len(self.times_s) - 1)
+        # Limits that are not kept between the times are tightened there, so often at the most.
+        for _ in range(8):
+            shares = self._shares(spray_pass, room)
+            over = self.driven(shares)[-1]
+            if over.max() <= 1.0:
+                return shares
+            room /= np.maximum(over, 1.0)
+        return shares / math.sqrt(over.max())
+
+    def _shares(self, spray_pass: np.ndarray, room: np.ndarray) -> np.ndarray:
+        """The shares where each step (N - 1,) keeps to this part of the limits.
 
         With b the square of the share the joints' accelerations are linear in b and its slope
-        (Verscheure et al. 2009), so that the fastest motion is a linear program. A pass keeps one
-        share, or its film would be uneven.
+        (Verscheure et al. 2009), so that the fastest motion is a linear program.
         """
         # No motion is slowed down to less: the robot stands in a singularity there.
         slowest = 0.01
@@ -184,6 +200,7 @@ class JointPace:
         # The neighbours count too: the share changes evenly between the times.
         speed = maximum_filter1d(np.abs(self.joints(self.times_s, 1)), 3, axis=0) / (1.0 - MARGIN)
         highest = np.minimum(1.0, (self.arm.fastest / np.maximum(speed, 1e-12)).min(axis=1) ** 2)
+        highest *= np.minimum(np.append(room, 1.0), np.append(1.0, room))
         bound = np.ones(column.max() + 1)
         np.minimum.at(bound, column, highest)
         slopes, bends = self.joints(self.times_s, 1).T, self.joints(self.times_s, 2).T
@@ -200,7 +217,7 @@ class JointPace:
                     shape=(count - 1, len(bound)),
                 )
                 rows += [part, -part]
-                sides += [np.full(count - 1, most)] * 2
+                sides += [most * room] * 2
         weights = np.bincount(column, minlength=len(bound)).astype(float)
         solved = linprog(
             -weights, A_ub=vstack(rows).tocsr(), b_ub=np.concatenate(sides),
@@ -213,12 +230,15 @@ class JointPace:
             )
         return np.sqrt(solved.x)[column]
 
-    def driven(self, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def driven(
+        self, shares: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """The joints at these shares (N,) of the planned speed.
 
-        Returned are the times (N,) at which the planned ones are reached; and times (M,) at an
-        even rate with the joints and their speeds (M, J) there. Between planned times the share
-        changes evenly. All is slower where the limits are not kept in between.
+        Returned are the times (N,) at which the planned ones are reached; times (M,) at an even
+        rate with the joints and their speeds (M, J) there; and for each step (N - 1,) the greatest
+        acceleration, or square of a speed, over its limit. Between planned times the share changes
+        evenly.
         """
         steps_s = 2.0 * np.diff(self.times_s) / (shares[1:] + shares[:-1])
         reached_s = np.append(0.0, np.cumsum(steps_s))
@@ -231,9 +251,10 @@ class JointPace:
         share = (shares[step] + rise * since)[:, np.newaxis]
         joints, slope = self.joints(planned_s), self.joints(planned_s, 1)
         rate = self.joints(planned_s, 2) * share**2 + slope * rise[:, np.newaxis]
-        too_fast = (np.abs(slope * share) / self.arm.fastest).max()
-        slower = max(1.0, float(too_fast), math.sqrt((np.abs(rate) / self.most).max()))
-        return slower * reached_s, slower * seconds, joints, slope * share / slower
+        of_limit = np.maximum((slope * share / self.arm.fastest) ** 2, np.abs(rate) / self.most)
+        over = np.zeros(len(steps_s))
+        np.maximum.at(over, step, of_limit.max(axis=1))
+        return reached_s, seconds, joints, slope * share, over
 
     def limits(self, spray_pass: np.ndarray, shares: np.ndarray) -> tuple[PassLimit, ...]:
         """For each pass that is slower than planned, the joint that makes it so."""

@@ -69,8 +69,7 @@ def plan_pass(
     """
     speed = speed_m_per_s or style.speed_m_per_s
     first, last = surface_map.extent_near_m(across_m, style.band_m)
-    # From standstill to full speed with the gun off.
-    # Travel at full speed before the gun opens and after it closes.
+    # With the gun off: from standstill to full speed, and some travel at that.
     lead = speed**2 / (2.0 * style.acceleration_m_per_s2) + 0.02
     beyond = style.overspray_m + lead
     count = max(2, math.ceil((last - first + 2.0 * beyond) / WAYPOINT_STEP_M) + 1)

@@ -143,7 +143,7 @@ def best_placement(
     low, high = index_range_m
     # Lines further out than the films that are kept are not considered.
     widest = (films.high_m - films.low_m) / max(passes - 1, 1)
-    high = min(high, widest)
+    high = max(low, min(high, widest))
     index = np.linspace(low, high, 25 if high > low and passes > 1 else 1)
     indices, offsets = (grid.ravel() for grid in np.meshgrid(index, np.linspace(-0.5, 0.5, 25)))
     lines = lines_of(passes, indices, middle + offsets * indices)

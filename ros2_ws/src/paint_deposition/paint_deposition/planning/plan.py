@@ -42,8 +42,6 @@ from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 from paint_deposition.planning.retiming import retime_for_evenness
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
 
-# Without a range the index is looked for about the one that is best on a plane.
-INDEX_SHARES = (0.75, 1.25)
 Planned = TypeVar('Planned', bound=PlannedFilm)
 
 
@@ -71,7 +69,7 @@ class Plan(PlannedFilm):
     def sentence(self) -> str:
         """The plan in a sentence."""
         speeds = f'{self.style.speed_m_per_s:.3g} m/s'
-        if self.unoptimised:
+        if self.unoptimised or (self.drive and self.drive.limits):
             sprayed = self.sprayed_speeds_m_per_s
             speeds = f'{min(sprayed):.3g} to {max(sprayed):.3g} m/s'
         return (
@@ -95,7 +93,6 @@ class Plan(PlannedFilm):
             'lines_m': [planned.across_m for planned in self.passes],
             'travel': 'one_way' if self.request.one_way else 'alternating',
             'gun_turns': False,
-            'speed_m_per_s': self.style.speed_m_per_s,
             'standoff_m': self.style.standoff_m,
             'overspray_m': self.style.overspray_m,
             'acceleration_m_per_s2': self.style.acceleration_m_per_s2,
@@ -140,19 +137,20 @@ def plan(
     area = surface.vertex_areas_m2[wanted.region]
     (left, right), ends = surface_map.extent_m.tolist()
     height = ends[1] - ends[0]
-    even = request.model_copy(update={'target_um': wanted.target_um})
-    plane = recommend(model, even.for_plane(height, right - left))
-    if request.index_m is not None:
-        index_range = request.index_m, request.index_m
-    else:
-        low, high = (share * plane.index_m for share in INDEX_SHARES)
-        index_range = request.index_min_m or low, request.index_max_m or high
+    # Speeds along the passes may make a film even that is not at one speed.
+    tolerance = None if request.optimise else request.tolerance
+    even = request.model_copy(update={'target_um': wanted.target_um, 'tolerance': tolerance})
+    try:
+        plane = recommend(model, even.for_plane(height, right - left))
+    except PlanError:  # a part may keep to a tolerance that no plane keeps to
+        anyhow = even.model_copy(update={'tolerance': None})
+        plane = recommend(model, anyhow.for_plane(height, right - left))
     style = _style(model, request, plane)
     films = LineFilms(
         surface, surface_map, model, style, plane.curve.parallel.first.finest_m,
         0.5 * plane.sb50_m, lambda share: progress('single passes', share),
     )  # fmt: skip
-    placement = place_passes(films, ends, index_range, request.tolerance)
+    placement = place_passes(films, ends, request.index_range_m(plane.index_m), tolerance)
     count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
     on_part = placement_at(films, count, plane.index_m, 0.5 * (ends[0] + ends[1]))
     target = None if request.speed_m_per_s else wanted.target_um
@@ -168,6 +166,12 @@ def plan(
         if abs(ratio - 1.0) <= 2e-3 or round_ == rounds - 1:
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
+    if tolerance is not None and found['sigma_n'] > tolerance:
+        raise PlanError(
+            f'{len(passes)} passes at {placement.index_m:.3f} m lay a film of sigma_n '
+            f'{100 * found["sigma_n"]:.2f} %, not within {100 * tolerance:g} %: allow that much, '
+            'or a smaller index, or choose speeds along the passes (--optimise)'
+        )
     return Plan(
         **found, passes=passes, moves=tuple(planned_moves(passes)), style=style,
         placement=placement, plane=plane, plane_on_part=on_part, line_films=films,
@@ -201,18 +205,21 @@ def optimise(
 
     The cost is sigma_n squared, and the weights of the request times the paint sprayed over the
     paint wanted on the part, and the cycle time over that of the unoptimised plan.
+
+    Raises:
+        PlanError: the film of no number of passes keeps to the tolerance; names the closest.
     """
     request, count = unoptimised.request, len(unoptimised.passes)
     target = unoptimised.wanted.target_um or unoptimised.mean_um
     areas_m2 = unoptimised.surface.vertex_areas_m2
     wanted_cm3 = target * float(areas_m2[unoptimised.wanted.region].sum())
     low, high = unoptimised.line_films.surface_map.extent_m[1].tolist()
-    least, most = (share * unoptimised.plane.index_m for share in INDEX_SHARES)
+    index_range_m = request.index_range_m(unoptimised.plane.index_m)
     placements = [unoptimised.placement]
     # From two passes fewer than in the unoptimised plan to one more.
     for passes in range(max(1, count - 2), count + 2):
         if passes != count:
-            placement = best_placement(unoptimised.line_films, (low, high), (least, most), passes)
+            placement = best_placement(unoptimised.line_films, (low, high), index_range_m, passes)
             placements += [placement] if placement else []
     tried = []
     for number, placement in enumerate(sorted(placements, key=lambda one: one.passes)):
@@ -221,6 +228,17 @@ def optimise(
             progress(what, (number + share) / len(placements))
 
         tried.append(_timed_plan(unoptimised, placement, target, wanted_cm3, show))
+    closest = min(tried, key=lambda one: one.sigma_n)
+    most = request.tolerance or closest.sigma_n
+    if closest.sigma_n > most:
+        raise PlanError(
+            f'no speeds along {count} passes, or about as many, keep sigma_n within '
+            f'{100 * most:g} %; the closest is {100 * closest.sigma_n:.2f} % with '
+            f'{len(closest.passes)} at {closest.placement.index_m:.3f} m: allow that much, a '
+            'smaller index, or other speeds (--speed-min, --speed-max)'
+        )
+    if request.tolerance is not None:
+        tried = [one for one in tried if one.sigma_n <= most]
     costs = [
         one.sigma_n**2
         + request.paint_weight * one.paint.emitted_cm3 / wanted_cm3
@@ -252,11 +270,12 @@ def _timed_plan(
         for planned in plan_passes(unoptimised.line_films.surface_map, lines, style)
     )
     programme = Programme.of(trajectory_of(passes, unoptimised.trajectory.frame_id))
-    start_cm3 = unoptimised.model.planar.K1_cm3_per_s * sum(p.sprayed_m / speed for p in passes)
+    start_s = sum(planned.sprayed_m / speed for planned in passes)
     zones = unoptimised.wanted.zones
     wanted = request.improvement(
         unoptimised.style.overspray_m, request.target_um if zones else target_um,
-        paint_weight=request.paint_weight * start_cm3 / wanted_cm3,
+        paint=unoptimised.model.planar.K1_cm3_per_s * start_s / wanted_cm3,
+        time=start_s / unoptimised.cycle_time_s,
     )  # fmt: skip
     models = [unoptimised.model]
     retimed = retime_for_evenness(
@@ -278,7 +297,7 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     The tool is turned about its own axis where that helps and the pattern is round.
 
     Raises:
-        PlanError: the robot does not reach all passes.
+        PlanError: the robot does not reach all passes, or its film exceeds the tolerance.
     """
     request, trajectory = planned.request, planned.trajectory
     quarter = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi])
@@ -290,6 +309,13 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     changed_um = np.abs(film_um - planned.film_um).max()
     drive = cell.drive(trajectory, bool(changed_um < 1e-3 * planned.film_um.max()))
     found = predicted(planned.surface, planned.model, request, planned.wanted, drive.trajectory)
+    sigma_n, most = found['sigma_n'], request.tolerance
+    if most is not None and sigma_n > most:
+        raise PlanError(
+            f'as the robot drives it sigma_n is {100 * sigma_n:.2f} %, where a tolerance of '
+            f'{100 * most:g} % is given: allow that much, or let the part stand elsewhere, paint '
+            'place shows where'
+        )
     # The robot program has moves as long as one that keeps the planned speeds.
     shortest_m = WAYPOINT_STEP_M * WAYPOINTS_PER_MOVE
     wanted = request.improvement(0.0, request.target_um, move_min_m=shortest_m)
@@ -308,7 +334,7 @@ def kept_clear(planned: Planned, envelope: GunEnvelope) -> Planned:
     if touched and not planned.request.allow_contact:
         raise PlanError(
             f'{max(touched, key=lambda contact: contact.depth_m)}; give a greater standoff_m or '
-            'smoothing_radius_m, another side (outward), or plan it face by face (--faces auto); '
-            'allow_contact keeps it'
+            'smoothing_radius_m, another side (outward), or plan it face by face with `paint plan '
+            '--faces auto`, of which allow_contact keeps it'
         )
     return replace(planned, contacts=found, envelope=envelope)

@@ -276,6 +276,14 @@ class PlannedFilm:
         return spray_path(self.trajectory)[0]
 
     @property
+    def _sprayed(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) travel with the gun open, and how long it takes [s], of each pass."""
+        sprayed = self.path.select(self.path.flow > 0.0)
+        _, number = np.unique(sprayed.spray_pass, return_inverse=True)
+        travel_m = np.bincount(number, sprayed.dwell_s * sprayed.speed_m_per_s)
+        return travel_m, np.bincount(number, sprayed.dwell_s)
+
+    @property
     def sentence(self) -> str:
         """The plan in a sentence."""
         return (
@@ -287,21 +295,33 @@ class PlannedFilm:
     def warnings(self) -> Iterator[str]:
         """Where the plan is not what was asked for, a line each."""
         request, target = self.request, self.request.target_um
+        slowed = bool(self.drive and self.drive.limits)
         # A mean film this close to the target is on it; speeds this close to a limit keep it.
         near = 0.01
         yield from map(str, self.drive.limits if self.drive else ())
         yield from map(str, self.contacts)
         yield from self.wanted.doubts(self.statistics)
-        at_speed = request.speed_m_per_s and not self.wanted.zones
-        if target and at_speed and abs(self.mean_um / target - 1.0) > near:
+        if target and not self.wanted.zones and abs(self.mean_um / target - 1.0) > near:
+            if request.speed_m_per_s and not request.optimise:
+                cause, remedy = 'at the speed given ', 'leave it out: it is chosen for the target'
+            elif slowed:
+                cause = 'with the passes that the joints slow down '
+                remedy = (
+                    'let the part stand elsewhere, paint place shows where, or give a lower '
+                    '--speed-max with --optimise'
+                )
+            elif request.optimise:
+                cause, remedy = '', 'allow other speeds (--speed-min, --speed-max)'
+            else:
+                cause, remedy = '', 'give a target nearer to it, or another index'
             yield (
-                f'at the speed given the mean film will be {self.mean_um:.1f} µm, not the target '
-                f'of {target:g} µm; leave out the speed and it is chosen for the target'
+                f'{cause}the mean film will be {self.mean_um:.1f} µm, not the target of '
+                f'{target:g} µm; {remedy}'
             )
         slowest, fastest = min(self.sprayed_speeds_m_per_s), max(self.sprayed_speeds_m_per_s)
         least, most = request.speed_min_m_per_s, request.speed_max_m_per_s
         outside = slowest < (1.0 - near) * least or fastest > (1.0 + near) * most
-        if outside and not request.optimise:  # which keeps them
+        if outside and (slowed or not request.optimise):  # which keeps them
             yield (
                 f'the passes run at {slowest:.3g} to {fastest:.3g} m/s, where {least:g} to '
                 f'{most:g} m/s are allowed (--speed-min, --speed-max)'
@@ -312,11 +332,14 @@ class PlannedFilm:
 
     def to_dict(self) -> dict[str, Any]:
         """Figures of the plan."""
+        travel_m, seconds = self._sprayed
         return {
             'direction': self.request.direction,
             'passes': len(self.passes),
             'cycle_time_s': self.cycle_time_s,
-            'sprayed_m': sum(planned.sprayed_m for planned in self.passes),
+            'sprayed_m': float(travel_m.sum()),
+            'speed_m_per_s': float(travel_m.sum() / seconds.sum()),
+            'speeds_m_per_s': (travel_m / seconds).tolist(),
             'sigma_n': self.sigma_n,
             'region': self.region,
             'film': self.statistics.to_dict(),

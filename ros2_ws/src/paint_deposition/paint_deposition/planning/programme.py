@@ -261,6 +261,8 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
     whole = programme.with_poses_at(stops_m)
     clock = whole.clock_s
     rows = _rows_to_stop_at(whole, stops_m)
+    # The first move, to the first pose, is as fast as the way from there to the first opening.
+    opened = max(rows[1], np.searchsorted(whole.travel_m, ends[0, 0] - STANDING_M))
     speed = np.append(np.diff(whole.travel_m) / whole.duration_s, 0.0)
     moves: list[Move] = []
     for before, row in zip([rows[0], *rows[:-1]], rows, strict=True):
@@ -276,7 +278,7 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
             left = np.searchsorted(whole.travel_m, whole.travel_m[before] + STANDING_M) - 1
             pace = length / (clock[row] - clock[left])
         else:
-            pace = float(speed[before : max(row, before + 1)].max())
+            pace = float(speed[before : row if moves else opened].max())
         pace = max(round(pace / 1e-5) * 1e-5, 1e-3)  # a program's speeds have few digits
         pose = whole.positions_m[row], whole.quaternions_xyzw[row]
         opening = programme.openings[max(number, 0)]

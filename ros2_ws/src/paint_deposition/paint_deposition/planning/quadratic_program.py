@@ -52,7 +52,8 @@ class Problem:
     nodes: Nodes
     bounds: tuple[np.ndarray, np.ndarray]  # greatest speeds and their limits, see speed_bounds
     request: ImproveRequest  # of the user
-    original_s: float  # paint of the original programme [s at the calibrated flow]
+    # Paint of the original programme at the mean film wanted [s at the calibrated flow].
+    original_s: float
     open_ends: np.ndarray  # (n,) bool, nodes at which the gun may be closed
     left_out: frozenset[str] = frozenset()  # names of limits that are left out
 

@@ -18,7 +18,7 @@ from paint_deposition.planning.index_search import (
     parallel_passes,
     passes_to_cover,
 )
-from paint_deposition.planning.requests import IndexRequest
+from paint_deposition.planning.requests import FASTEST_M_PER_S, SLOWEST_M_PER_S, IndexRequest
 
 # Within this share of a speed film goes as 1 / speed, whatever an effect makes of the speed.
 NEAR = 1e-4
@@ -207,11 +207,13 @@ def _within_speeds(
     low, high = max(low_m, at_1_m / most), min(high_m, at_1_m / least)
     if not low < high:
         wanted, nearest = (at_1_m / low_m, least) if high < low_m else (at_1_m / high_m, most)
+        remedy = 'allow other speeds (speed_min_m_per_s, speed_max_m_per_s), or another index'
+        if (least, most) == (SLOWEST_M_PER_S, FASTEST_M_PER_S):  # nothing is slower or faster
+            remedy = 'give another target or index'
         raise PlanError(
             f'target_um {request.target_um:g} at an index from {low_m:g} to {high_m:g} m needs '
             f'{wanted:.3g} m/s, where {least:g} to {most:g} m/s are allowed; the closest is '
-            f'{request.target_um * wanted / nearest:.3g} µm at {nearest:g} m/s: allow other '
-            'speeds (speed_min_m_per_s, speed_max_m_per_s), or another index'
+            f'{request.target_um * wanted / nearest:.3g} µm at {nearest:g} m/s: {remedy}'
         )
     return low, high
 
@@ -249,7 +251,8 @@ def _notes(
             notes.append(f'with the gun {how} sigma_n there would be {100 * there:.2f} %')
     end = curve.best_end
     if best not in curve.minima:
-        notes.append('there is no minimum of sigma_n here; it is more even at a smaller index')
+        side = 'smaller' if best.index_m < curve.index_m.mean() else 'greater'
+        notes.append(f'there is no minimum of sigma_n here; it is more even at a {side} index')
     elif request.tolerance is None and end.sigma_n < best.sigma_n:
         notes.append(
             f'at the end of the range, {1e3 * end.index_m:.0f} mm, sigma_n is only '

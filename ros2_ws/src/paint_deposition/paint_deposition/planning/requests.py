@@ -24,7 +24,7 @@ class FilmBuild(Request):
         least=SLOWEST_M_PER_S, most=FASTEST_M_PER_S,
     )  # fmt: skip
     target_um: float | None = given(
-        None, 'Mean film build; the speed is chosen for it if it is not given [µm].', above=0.0
+        None, 'Mean film wanted; without --speed the speed is chosen for it [µm].', above=0.0
     )
 
 
@@ -33,14 +33,14 @@ class PassRequest(FilmBuild):
 
     index_min_m: float | None = given(
         None,
-        'Least index [m]; default: 0.2, of an unusual SB50 0.35 of it.',
+        'Least index [m]; default: 0.2; where SB50 is outside 0.25 to 0.75 m, 0.35 of it.',
         '--index-min',
         least=0.001,
         most=10.0,
     )
     index_max_m: float | None = given(
         None,
-        'Greatest index [m]; default: 0.8, of an unusual SB50 1.4 of it.',
+        'Greatest index [m]; default: 0.8; where SB50 is outside 0.25 to 0.75 m, 1.4 of it.',
         '--index-max',
         least=0.001,
         most=10.0,
@@ -182,12 +182,40 @@ class PlanRequest(Limits, PassRequest):
             raise PlanError('outward is 0 0 0; give a direction, 0 -1 0 say')
         return self
 
+    @model_validator(mode='after')
+    def _index_in_range(self) -> 'PlanRequest':
+        for end, side in ((self.index_min_m, 1.0), (self.index_max_m, -1.0)):
+            if self.index_m is not None and end is not None and side * (end - self.index_m) > 0.0:
+                name = 'index_min_m' if side > 0.0 else 'index_max_m'
+                raise PlanError(
+                    f'index_m is {self.index_m:g}, beyond {name}, {end:g}; leave out one of them'
+                )
+        return self
+
+    def index_range_m(self, best_m: float) -> tuple[float, float]:
+        """Where the index is looked for; without a range about the one that is best on a plane."""
+        if self.index_m is not None:
+            return self.index_m, self.index_m
+        return self.index_min_m or 0.75 * best_m, self.index_max_m or 1.25 * best_m
+
     def improvement(
-        self, overspray_m: float, target_um: float | None, **weights: float
+        self,
+        overspray_m: float,
+        target_um: float | None,
+        paint: float = 1.0,
+        time: float = 1.0,
+        **others: float,
     ) -> 'ImproveRequest':
-        """For the speeds along the passes; the gun may be closed up to the edge of the part."""
+        """For the speeds along the passes; the gun may be closed up to the edge of the part.
+
+        ``paint`` is that of the passes to begin with over that of the film on the part, ``time``
+        that with the gun open over the whole of the plan without speeds along its passes.
+        """
         limits = {name: getattr(self, name) for name in Limits.model_fields}
-        return ImproveRequest(**limits, target_um=target_um, trigger_cut_m=overspray_m, **weights)
+        return ImproveRequest(
+            **limits, target_um=target_um, trigger_cut_m=overspray_m,
+            paint_weight=paint * self.paint_weight, time_weight=time * self.time_weight, **others,
+        )  # fmt: skip
 
     def for_plane(self, width_m: float, length_m: float) -> IndexRequest:
         """For a plane of the part's size, at any speed: a part needs another than its plane."""

@@ -44,8 +44,9 @@ class Face:
 def sprayable_faces(surface: Surface, widest_rad: float = WIDEST_RAD) -> tuple[Face, ...]:
     """Split the outward side of a part, an open sheet, the largest face first.
 
-    The normals are grouped about as few mean directions as keep them within the angle (k-means on
-    the sphere). Connected triangles of one group are a face; small ones go to a neighbour.
+    The normals are grouped about as few mean directions as keep 95 % of the area within the angle
+    (k-means on the sphere). Connected triangles of one group are a face; small ones go to a
+    neighbour.
     """
     normals = face_normals(surface.vertices_m, surface.faces)
     areas = face_areas_m2(surface.vertices_m, surface.faces)

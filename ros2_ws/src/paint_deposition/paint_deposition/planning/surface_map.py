@@ -52,7 +52,10 @@ class SurfaceMap:
         self.axes, self.radius_m, self.origin_m = axes, radius_m, surface.centre_m
         self.painted = painted_side(surface, axes[2])
         if not self.painted.any():
-            raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
+            raise PlanError(
+                f'no surface faces the gun at {" ".join(f"{one:.2g}" for one in axes[2])} '
+                'from the part; give another direction to it (outward)'
+            )
         self.surface_m = (surface.vertices_m[self.painted] - self.origin_m) @ axes.T
         facing = surface.normals @ axes[2]
         weight = surface.vertex_areas_m2[self.painted] * facing[self.painted]

@@ -294,11 +294,14 @@ def _scale(result: Improvement) -> ColourScale:
 
 def write_places(path: str | Path, places: PartPlaces) -> Path:
     """Draw the share of the planned speed at each place, or how much of the motion is reached."""
-    step = max(np.ptp(places.x_m) / max(len(places.x_m) - 1, 1), 1e-3)
-    edges = [np.append(at, at[-1] + step) - 0.5 * step for at in (places.x_m, places.y_m)]
+    axes_m = places.x_m, places.y_m
+    steps = [float(np.ptp(at)) / max(len(at) - 1, 1) for at in axes_m]
+    # A single column is as wide as the rows are high, and a single place this wide [m].
+    steps = [step or max(steps) or 0.2 for step in steps]
+    edges = [np.append(at, at[-1] + s) - 0.5 * s for at, s in zip(axes_m, steps, strict=True)]
     low, high = (np.array([one[end] for one in edges]) for end in (0, -1))
     width, height = (high - low) * min(5.2 / (high - low))
-    figure = new_figure(width + 2.4, height + 1.4)
+    figure = new_figure(max(width + 2.4, 4.8), height + 1.4)  # as wide as its words
     axes = figure.subplots()
     quiet(axes, "x of the part in the robot's base [m]", 'y [m]')
     figure.suptitle(

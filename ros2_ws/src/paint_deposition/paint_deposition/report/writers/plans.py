@@ -203,7 +203,7 @@ def _passes(
     if isinstance(result, PartPlan):
         # The film is seen from one side, the passes from three. That they lie aside of the one
         # side that a part usually has is not odd here.
-        geometry = spray_geometry(surface, result.path, result.model, frame_id)
+        geometry = spray_geometry(surface, result.path, result.model)
         geometry = replace(geometry, warnings=tuple(map(str, result.contacts)))
         files.append(folder / f'passes.{pictures}')
         title = 'Planned passes over the faces'
@@ -248,13 +248,7 @@ def _chosen_readings(
     part = None if part_pose is None else Rigid.of(part_pose)
     files = [folder / n for n in ('measure.json', 'points.csv', 'poses.csv')]
     poses: list[Sequence[object]] = [('point', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw')]
-    # The gauge's z axis looks into the surface, its x axis level to the right.
-    into = -result.normals
-    right = across_axis(result.surface.outward, result.surface.down)
-    across = right - (into @ right)[:, np.newaxis] * into
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    axes = np.stack([across, np.cross(into, across), into], axis=2)
-    turns = Rotation.from_matrix(axes).as_quat()
+    turns = gauge_turns(result.normals, result.surface.outward, result.surface.down)
     for name, *pose in zip(result.names, result.positions_m, turns, strict=True):
         position, quaternion = part.applied(*pose) if part else pose
         poses.append([name, *(f'{v:.6f}' for v in position), *(f'{v:.8f}' for v in quaternion)])
@@ -274,3 +268,17 @@ def _chosen_readings(
     write_table(files[1], points)
     write_table(files[2], poses)
     return [*files, write_measuring_picture(folder / f'points.{pictures}', result)]
+
+
+def gauge_turns(normals: np.ndarray, outward: np.ndarray, down: np.ndarray) -> np.ndarray:
+    """(N, 4) turns of a gauge whose z axis looks into the surface, its x axis level to the right.
+
+    Where a normal (N, 3) looks to the right or the left itself, x is that of ``outward`` (3,).
+    """
+    into, right = -normals, across_axis(outward, down)
+    aside = np.abs(into @ right)[:, np.newaxis] > 1.0 - 1e-6
+    level = np.where(aside, outward, right)
+    across = level - np.sum(into * level, axis=1, keepdims=True) * into
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    axes = np.stack([across, np.cross(into, across), into], axis=2)
+    return Rotation.from_matrix(axes).as_quat()

@@ -125,7 +125,7 @@ def writable(folder: Path) -> Iterator[None]:
 
 def input_files(made_from: Mapping[str, Any]) -> dict[str, str]:
     """Files among what a command says of its inputs, by what they are."""
-    keys = ('mesh_file', 'mesh', 'trajectory', 'model_file', 'model', 'zones_file')
+    keys = ('mesh_file', 'trajectory', 'model_file', 'zones_file')
     named = {key.removesuffix('_file'): str(made_from[key]) for key in keys if made_from.get(key)}
     return {what: file for what, file in named.items() if Path(file).exists()}
 
