@@ -24,7 +24,7 @@ ON = [0, 1, 1, 0, 0]
 LAYOUTS = Path(__file__).with_name('poses')
 SAID = {
     'kuka': {'pose_unit': 'mm'}, 'rotation_vector_deg': {'rotation': 'rotvec'},
-    'z_first': {'rotation': 'ZYX'}, 'kawasaki': {'rotation': 'kawasaki'},
+    'z_first': {'rotation': 'ZYX'}, 'kawasaki': {'rotation': 'Kawasaki'},
 }  # fmt: skip
 
 
@@ -45,6 +45,7 @@ def test_every_layout_is_the_same_motion(path):
     [
         ('Gun on', ON, {}), ('flow', [0, 0.9, 1.1, 0, 0], {}),
         ('DO_12', ON, {'state_topic': 'DO_12'}),
+        ('DO_12,flow', ['0,0', '1,0.9', '1,1.1', '0,0', '0,0'], {'state_topic': 'DO_12'}),
     ],
 )  # fmt: skip
 def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
@@ -53,8 +54,9 @@ def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
     (tmp_path / 'poses.csv').write_text('\n'.join([f'{head},{heading}', *lines]))
     read = read_recording(tmp_path / 'poses.csv', **options)
     assert np.array_equal(read.trigger_stamps_ns, read.stamps_ns)
-    assert np.allclose(read.trigger_flow, flows)
-    assert f'gun by {heading}' in read.notes[0]
+    expected = [float(str(flow).rsplit(',')[-1]) for flow in flows]
+    assert np.allclose(read.trigger_flow, expected)
+    assert f'gun by {heading.replace(",", " ")}' in read.notes[0]
 
 
 @pytest.mark.parametrize('axis', ['x', 'y', 'z', '-x', '-y', '-z'])
@@ -63,6 +65,21 @@ def test_the_tool_may_spray_along_another_of_its_axes(axis):
     sprays = Rotation.from_quat(read.quaternions_xyzw).as_matrix()[:, :, 2]
     column = TURNS.as_matrix()[:, :, 'xyz'.index(axis[-1])]
     assert sprays == pytest.approx(-column if axis[0] == '-' else column, abs=1e-6)
+
+
+def test_a_turned_tool_keeps_the_norms_by_which_damage_is_known(tmp_path):
+    rows = ['0,1,2,3,0,0,0,0.3', '1,1,2,4,0,0,0,0', '2,1,2,5,nan,0,0,1', '3,1,2,6,0,0,0,1.004']
+    (tmp_path / 'p.csv').write_text('t,x,y,z,qx,qy,qz,qw\n' + '\n'.join(rows))
+    turned = read_recording(tmp_path / 'p.csv', tool_axis='x').quaternions_xyzw
+    norms = np.linalg.norm(turned, axis=1)
+    assert norms == pytest.approx([0.3, 0.0, np.nan, 1.004], nan_ok=True)
+
+
+def test_t_beside_o_and_a_is_an_angle(tmp_path):
+    rows = ['1,2,3,10,20,30,0.5', '1,2,4,10,20,30,0.5']
+    (tmp_path / 'p.csv').write_text('x,y,z,O,A,T,speed_m_per_s\n' + '\n'.join(rows))
+    read = read_recording(tmp_path / 'p.csv', rotation='kawasaki')
+    assert read.duration_s == pytest.approx(2.0)
 
 
 def test_what_could_be_the_trigger_is_named(tmp_path):
@@ -151,3 +168,5 @@ def test_options_of_other_kinds_of_files_are_refused():
         read_recording(LAYOUTS / 'plain.csv', '/pose')
     with pytest.raises(RecordingError, match="rotation: 'zxq' is no convention; give 'rotvec'"):
         read_recording(LAYOUTS / 'plain.csv', rotation='zxq')
+    with pytest.raises(RecordingError, match="'ZZX' is no convention"):
+        read_recording(LAYOUTS / 'plain.csv', rotation='ZZX')

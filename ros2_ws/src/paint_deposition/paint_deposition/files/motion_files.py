@@ -58,8 +58,10 @@ class MotionSource(MotionOptions):
     @field_validator('rotation')
     @classmethod
     def _is_rotation(cls, name: str | None) -> str | None:
-        known = name is None or name.lower() in ('rotvec', *CONVENTIONS)
-        if not (known or re.fullmatch(r'[xyz]{3}|[XYZ]{3}', name or '')):
+        if name is None or name.lower() in ('rotvec', *CONVENTIONS):
+            return name and name.lower()
+        # Two turns in a row about one axis are one, and no convention.
+        if not re.fullmatch(r'[xyz]{3}|[XYZ]{3}', name) or name[1] in (name[0], name[2]):
             raise ValueError(f'{name!r} is no convention; give {ROTATION_WORDS}')
         return name
 
@@ -130,7 +132,11 @@ def _turned(recorded: Trajectory, source: MotionSource) -> Trajectory:
         return recorded
     sign, axis = (-1.0 if source.tool_axis[0] == '-' else 1.0), 'xyz'.index(source.tool_axis[-1])
     turn, _ = Rotation.align_vectors([sign * np.eye(3)[axis]], [[0.0, 0.0, 1.0]])
-    turned = (Rotation.from_quat(recorded.quaternions_xyzw) * turn).as_quat()
+    # Of unchanged norm, by which damaged ones are known.
+    turned = recorded.quaternions_xyzw.copy()
+    norms = np.linalg.norm(turned, axis=1)
+    rows = (norms > 0.0) & np.isfinite(norms)
+    turned[rows] = norms[rows, np.newaxis] * (Rotation.from_quat(turned[rows]) * turn).as_quat()
     notes = (*recorded.notes, f'its tool sprays along {source.tool_axis}')
     return replace(recorded, quaternions_xyzw=turned, notes=notes)
 

@@ -238,7 +238,7 @@ def read_rotations(
         )
     if convention == 'rotvec':
         return Rotation.from_rotvec(angles).as_quat(), f'rotation vector {written} in {unit}'
-    sequence = CONVENTIONS.get(convention.lower(), convention)
+    sequence = CONVENTIONS.get(convention, convention)
     if by_axis and len(set(sequence.lower())) == 3:
         angles = angles[:, ['xyz'.index(letter) for letter in sequence.lower()]]
     axes = "the tool's axes" if sequence.isupper() else 'fixed axes'

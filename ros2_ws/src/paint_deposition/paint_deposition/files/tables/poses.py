@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
 
 SUFFIXES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods')
-# Names of columns, as `column_name` leaves them. The letter t is also an angle of Kawasaki's.
+# Names of columns, as `column_name` leaves them.
 TIME = ('time', 'timestamp', 'stamp', 'timefromstart', 'elapsed', 'zeit', 't')
 TRIGGER = ('spraying', 'trigger', 'gun', 'gunon', 'on', 'spray', 'sprayon', 'paint', 'painton')
 FLOW = ('flow', 'relativeflow')
@@ -89,7 +89,9 @@ def _motion(
     brushes, by_brush = _brushes(table)
     if flows is None and brushes.any():
         flows = np.ones(len(brushes))
-    time, speed = table.find(*TIME), None if robot else table.find(*SPEED)
+    # Beside o and a, the letter t is an angle of Kawasaki's.
+    times = TIME[:-1] if table.find('o') is not None and table.find('a') is not None else TIME
+    time, speed = table.find(*times), None if robot else table.find(*SPEED)
     if time is None and speed is None:
         or_speed = '' if robot else ', or speed_m_per_s for programmed passes'
         raise RecordingError(
@@ -174,7 +176,8 @@ def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
     if name is None:
         trigger, flow = table.find(*TRIGGER), table.find(*FLOW)
     elif name.strip() in texts:
-        trigger, flow = texts.index(name.strip()), None
+        trigger, flow = texts.index(name.strip()), table.find(*FLOW)
+        flow = None if flow == trigger else flow
     else:
         raise RecordingError(f'no column is called {name}; {did_you_mean(name, texts)}')
     if trigger is None and flow is None:
