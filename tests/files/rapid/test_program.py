@@ -138,6 +138,19 @@ def test_outputs_and_triggers_switch_the_gun(read):
     assert all(move.switches == () for move in moves if move is not moves[2])
 
 
+@pytest.mark.parametrize(
+    ('on', 'off', 'stays_open'),
+    [('30', '50', True), ('50\\Start', '60\\Start', False), ('10\\Start', '95', True)],
+)
+def test_the_gun_stays_as_the_trigger_that_comes_last_leaves_it(read, on, off, stays_open):
+    """In whichever order they are written, in a move of 100 mm."""
+    triggers = f'TriggIO on,{on}\\DOp:=doGun,1;\nTriggIO off,{off}\\DOp:=doGun,0;'
+    for both in ('on\\T2:=off', 'off\\T2:=on'):
+        way = f'MoveL {target(0)},v600,fine,tBell;\nTriggL {target(100)},v600,{both},z50,tBell;'
+        moves = read(f'{triggers}\n{way}\nMoveL {target(200)},v600,fine,tBell;').moves
+        assert moves[-1].spraying == stays_open
+
+
 def test_the_gun_is_one_of_several_outputs(read):
     body = f'SetDO doHorn,1;\nSet doGun;\nMoveL {target(1)},v600,fine,tBell;'
     assert 'sets dogun dohorn; say which of them opens the gun' in refusal(read, body)
@@ -361,6 +374,19 @@ def test_a_tool_that_only_turns_takes_its_time(motion):
     )
     assert trajectory.duration_s == pytest.approx(90.0 / 500.0, abs=1e-6)
     assert np.all(np.ptp(trajectory.positions_m, axis=0) == 0.0)
+
+
+@pytest.mark.parametrize(
+    'move',
+    [
+        f'MoveC {down(100, 100)},{down(0, 200)},v100\\T:=4,fine,tool0;',
+        f'MoveL {down(0, wxyz="0,0.8,0.6,0")},v100\\T:=4,fine,tool0;',
+        f'VelSet 50,5000;MoveL {down(100)},v100\\T:=2,fine,tool0;',
+    ],
+)
+def test_a_move_takes_the_time_that_it_is_given(motion, move):
+    trajectory = motion(f'MoveL {down(0)},v100,fine,tool0;{move}')
+    assert trajectory.duration_s == pytest.approx(4.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(
