@@ -297,6 +297,8 @@ AT_W = f'MoveL {target(0)},v100,z10,tool0\\WObj:=w;'
         (f'MoveL {target("1e400")},v100,z10,tool0;', '', 'is no position [x, y'),
         ('n:=1/0;', 'VAR num n;', 'line 4: division by zero'),
         ('SetBrush;', '', 'setbrush needs a number'),
+        ('Add reg1;', '', 'line 4: add takes 2 arguments, not 1'),
+        ('Incr;', '', 'line 4: incr takes 1 argument, not 0'),
         ('SetBrush 2.5;', '', 'line 4: setbrush takes the number of a brush, not 2.5'),
         ('TriggIO t\\DOp:=doGun;', 'VAR triggdata t;', 'triggio needs a number'),
         (f'MoveL {target(0)},v100\\V:=[1],z10,tool0;', '', 'speed is [1.0]; a number expected'),

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
+from robot_arm import URDF
 from workbook import write_workbook
 
 # A gun that sways while it goes, and is on in the middle.
@@ -89,6 +90,12 @@ def test_what_could_be_the_trigger_is_named(tmp_path):
     assert warning.startswith('the gun counts as always on; if Pistole is its trigger')
     read = read_recording(tmp_path / 'p.csv', state_topic='Pistole')
     assert (read.trigger_flow.tolist(), read.warnings) == ([0.0, 1.0, 0.0], ())
+
+
+def test_an_empty_table_has_no_joints_either(tmp_path):
+    (tmp_path / 'p.csv').write_text('')
+    with pytest.raises(RecordingError, match=r'no columns .* \(its first row: none\)'):
+        read_recording(tmp_path / 'p.csv', urdf=str(URDF))
 
 
 def test_a_workbook_is_a_log_too(tmp_path):

@@ -61,7 +61,7 @@ class PoseTable(Table):
         sheet, header = find_table(path, RecordingError, known, several=alone)
         if header is None:
             first = ', '.join(map(text_of, sheet.rows[0])) if sheet.rows else 'none'
-            if robot is not None:
+            if robot is not None and sheet.rows:
                 robot.recorded_joints(_by_text(headings_in(sheet.rows[0])), str(path), True)
             raise RecordingError(
                 f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first}); '
