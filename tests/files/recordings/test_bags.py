@@ -211,6 +211,23 @@ def test_a_part_of_a_split_bag_is_not_taken_for_the_whole(tmp_path):
     assert warning.startswith('pass_1.mcap is one of the 2 files of a split bag; give its folder')
 
 
+def test_a_file_has_the_custom_data_of_its_folder_alone(tmp_path):
+    """Not that of a folder which it was only put into; there, all of its messages count."""
+    told = {'trigger_topic': '/atomizer/state', 'messages_of_the_part': '/atomizer/pose=7'}
+    plan = write_pose_bag(tmp_path / 'plan', straight_pass(), told)
+    own = pd.read_recording(plan / 'plan_0.mcap')
+    assert (len(own), len(own.trigger_flow)) == (7, 2)
+    shutil.copy(plan / 'plan_0.mcap', plan / 'other.mcap')
+    other = pd.read_recording(plan / 'other.mcap')
+    assert (len(other), len(other.trigger_flow)) == (50, 0)
+
+
+def test_damaged_metadata_beside_a_file_is_no_traceback(tmp_path):
+    told = {'messages_of_the_part': '/atomizer/pose=seven'}
+    folder = write_pose_bag(tmp_path / 'run', straight_pass(5), told)
+    assert 'run_0.mcap is damaged (invalid literal' in refusal(folder / 'run_0.mcap')
+
+
 def test_other_files_under_a_bags_name(tmp_path):
     """A cut ROS 1 bag is damaged likewise."""
     for name in ('a.mcap', 'a.db3', 'a.bag'):

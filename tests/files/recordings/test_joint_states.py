@@ -300,9 +300,10 @@ def test_the_run_of_a_part_keeps_the_order_in_which_its_states_came(tmp_path):
     told = replace(PASS, trigger_stamps_ns=stamps, trigger_flow=np.array([0.5, 1.0]))
     for custom_data, rows in ({'serial': '1'}, [0, 10]), ({}, []):
         bag = write_pose_bag(tmp_path / f'run_{len(rows)}', told, custom_data)
-        read = read_recording(bag, state_topic='/atomizer/state')
-        assert read.trigger_stamps_ns.tolist() == stamps.tolist()
-        assert read.trigger_rows.tolist() == rows
+        for path in (bag, *bag.glob('*.mcap')):
+            read = read_recording(path, state_topic='/atomizer/state')
+            assert read.trigger_stamps_ns.tolist() == stamps.tolist()
+            assert read.trigger_rows.tolist() == rows
 
 
 BELL = [0.0, 0.02, 0.31, *Rotation.from_euler('y', 0.3).as_quat()]

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.rapid.program import is_rapid, program_trajectory, read_program
-from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
+from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.recordings.messages import JOINT_TYPE
 from paint_deposition.files.recordings.pose_topics import lookups, read_frames
@@ -199,7 +199,7 @@ def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
         trigger = state.name if state else None
         return trajectory_of(bag, f'/{gun}{POSE_TOPIC}', trigger, *how)
     # The bag of a plan names its trigger itself.
-    planned = None if source.state_topic else custom_data(bag.path).get(TRIGGER)
+    planned = None if source.state_topic else bag.custom_data.get(TRIGGER)
     trigger = source.state_topic or planned
     recorded = trajectory_of(bag, source.pose_topic, trigger, *how)
     notes = (f'a plan: its trigger {planned} is used',) if planned else ()
