@@ -135,6 +135,33 @@ def test_a_mesh_says_its_size_and_unit(panel, scale, words, tmp_path):
     assert box == 'x -0.600 to 0.600, y 0.000 to 0.000, z -0.400 to 0.400 m'
 
 
+def test_a_mesh_is_read_with_the_scale_and_the_body_that_are_given(panel, tmp_path):
+    trimesh.load_mesh(panel).apply_scale(1e3).export(tmp_path / 'part.stl')
+    given = ('--mesh-scale', 0.001, '--body', 'part')
+    figures = figures_of('inspect', tmp_path / 'part.stl', *given, '--json')
+    assert (figures['mesh_scale'], figures['high_m'][0]) == (0.001, pytest.approx(0.6))
+    assert 'read with --mesh-scale 0.001' in ran('inspect', tmp_path / 'part.stl', *given).stdout
+    assert_refused(paint('inspect', tmp_path / 'part.stl', '--body', 'lid'), "no body 'lid'")
+
+
+@pytest.mark.parametrize(
+    ('file', 'given', 'what'),
+    [
+        ('door.stl', '--tf a b', 'a mesh'), ('door.stl', '--max-edge-length-m 0.1', 'a mesh'),
+        ('door.csv', '--strict', 'gauge readings'),
+        ('door.csv', '--mesh-scale 1', 'gauge readings'),
+        ('door_horizontal', '--body door', 'a bag'), ('door_horizontal', '--frame-id a', 'a bag'),
+        ('poses.csv', '--tool-axis x', 'a table of poses'),
+    ],
+)  # fmt: skip
+def test_what_does_nothing_is_refused(file, given, what, tmp_path):
+    (tmp_path / 'poses.csv').write_text('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n')
+    (tmp_path / 'door.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
+    path = tmp_path / file if file.endswith('.csv') else SAMPLES / file
+    words = given.split()
+    assert_refused(paint('inspect', path, *words), f'{words[0]}: not for {what}; leave it')
+
+
 def test_a_bag_without_poses_says_where_its_motion_is(shared_data):
     done = paint('inspect', shared_data / 'bags' / 'evo_nav2_turtlebot.mcap')
     assert 'transforms: --tf TARGET SOURCE takes the motion from them' in done.stdout

@@ -171,7 +171,9 @@ def test_joint_states_that_are_not_used_are_counted(tmp_path):
 def test_joints_that_are_never_known_together_are_named(tmp_path):
     rows = [('/arm', stamp, JOINTS[1:], joints[1:]) for _, stamp, _, joints in rows_of()[:70]]
     rows += [('/pan', stamp, JOINTS[:1], joints[:1]) for _, stamp, _, joints in rows_of()[80:]]
-    with pytest.raises(RecordingError, match=r'elbow on /arm until .* s, shoulder_pan on /pan from'):
+    with pytest.raises(
+        RecordingError, match=r'elbow on /arm until .* s, shoulder_pan on /pan from'
+    ):
         read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(URDF))
 
 

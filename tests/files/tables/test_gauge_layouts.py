@@ -60,7 +60,9 @@ def test_predictions_are_written_beside_the_columns_of_the_file(tmp_path):
 
 
 def test_layers_side_by_side_are_predicted_each(file, tmp_path):
-    path = file('a.csv', 'Punkt;x [m];y [m];z [m];Basislack;Klarlack\nA,1;0;0;0;15,5;40\nB;1;0;0;;41\n')
+    path = file(
+        'a.csv', 'Punkt;x [m];y [m];z [m];Basislack;Klarlack\nA,1;0;0;0;15,5;40\nB;1;0;0;;41\n'
+    )
     readings = read_readings(path)
     assert readings.layer.tolist() == ['base', 'clear', 'clear']
     write_predictions(tmp_path / 'predicted.csv', readings, np.array([15.0, 42.0, 43.0]))

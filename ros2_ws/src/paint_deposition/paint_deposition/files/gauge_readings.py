@@ -242,7 +242,7 @@ def write_predictions(path: str | Path, readings: Readings, predicted_um: np.nda
     """Write the columns of the readings' file and ``predicted_um`` (N,), whole or not at all.
 
     A row with several readings is written once: they are at one place. Layers side by side have a
-    column each, such as ``predicted_um base``. Numbers have a decimal point, whatever the file has.
+    column each, such as ``predicted_um base``. Numbers have a decimal point, as in the file or not.
     """
     read = ReadingTable.read(Path(readings.source), True, Layout(), readings.point)
     _, row, layer, _ = read.films_um()

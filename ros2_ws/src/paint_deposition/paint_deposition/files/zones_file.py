@@ -105,7 +105,12 @@ def _regions(
         mesh = folder / entry.mesh if entry.mesh else part
         of_mesh = entry.body or (None if entry.mesh else body)
         vertices_m, faces, rows, _ = read_triangles(mesh, entry.mesh_scale or scale, of_mesh)
-        if entry.faces:
+        if entry.faces and rows is None:
+            raise PaintError(
+                f'faces: {mesh} has several bodies, in no order of their own; name one with body, '
+                f'which numbers its triangles from 0 (paint inspect {mesh} lists them)'
+            )
+        if entry.faces and rows is not None:
             highest, most = int(rows[-1]), max(last for _, last in entry.faces)
             if most > highest:
                 raise PaintError(f'faces: {mesh} has no triangle {most}, its last is {highest}')

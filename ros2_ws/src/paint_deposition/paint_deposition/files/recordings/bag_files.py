@@ -247,7 +247,7 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
 
 
 def custom_data(path: Path) -> dict[str, str]:
-    """The custom data in the metadata.yaml of a rosbag2 folder, or of one of its files, by name."""
+    """The custom data in the metadata.yaml of a rosbag2 folder, or of one of its files."""
     told = _information(path).get('custom_data')
     return {str(key): str(value) for key, value in told.items()} if isinstance(told, dict) else {}
 
