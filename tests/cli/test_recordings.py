@@ -75,6 +75,11 @@ def test_a_table_of_poses_says_what_was_understood(tmp_path):
     assert told['high_m'] == [0.095, 0.0, 0.0]
 
 
+def test_a_table_with_quaternions_is_one_of_poses(tmp_path):
+    (tmp_path / 'poses.csv').write_text('t,x,y,z,qx,qy,qz,qw,value\n0,0,0,0,0,0,0,1,20\n')
+    assert figures_of('inspect', tmp_path / 'poses.csv', '--json')['poses'] == 1
+
+
 def test_a_table_of_readings_says_its_zeros_repeats_and_gaps(tmp_path):
     (tmp_path / 'points.csv').write_text('no,x_m,y_m,z_m\n1,0,0,0\n2,0.5,0,0\n3,1,0,0\n4,2,0,0\n')
     (tmp_path / 'door.csv').write_text('point;DFT\n1;20,5\n1;21,5\n2;0\n3;n/a\n4;23\n')

@@ -187,6 +187,8 @@ def test_the_first_zone_that_holds_a_point_has_it_and_others_none(bracket):
     ('zones', 'message'),
     [
         (('name: a, target_um: 30',), "zone 1 has no 'tolerance_um'"),
+        ((f'name: null, {BAND}, faces: [0]',), 'name is None; expected what to call it'),
+        ((f'name: 12.10, {BAND}, faces: [0]',), 'name: 12.1 is no text; put it in quotes'),
         ((f'name: a, {BAND}',), 'no place; give box, body, faces or mesh'),
         (('name: a, target_um: 5, tolerance_um: 5, faces: [0]',), 'give a smaller one'),
         ((f'name: a, {BAND}, faces: [0-x]',), "'0-x' is no number and no range"),

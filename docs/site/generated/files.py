@@ -104,9 +104,9 @@ def _bounds(said: dict[str, Any]) -> str:
         low, above = kind.get('minimum'), kind.get('exclusiveMinimum')
         high = kind.get('maximum')
         if above is not None:
-            return f'above {above:g}' if high is None else f'above {above:g} to {high:g}'
+            return f'above {above:.10g}' if high is None else f'above {above:.10g} to {high:.10g}'
         if low is not None:
-            return f'{low:g} or more' if high is None else f'{low:g} to {high:g}'
+            return f'{low:.10g} or more' if high is None else f'{low:.10g} to {high:.10g}'
     return ''
 
 

@@ -153,9 +153,28 @@ def test_the_gun_stays_as_the_trigger_that_comes_last_leaves_it(read, on, off, s
 
 def test_the_gun_is_one_of_several_outputs(read):
     body = f'SetDO doHorn,1;\nSet doGun;\nMoveL {target(1)},v600,fine,tBell;'
-    assert 'sets dogun dohorn; say which of them opens the gun' in refusal(read, body)
+    assert 'sets dogun dohorn; give the one that opens the gun as' in refusal(read, body)
     assert read(body, gun_signal='doGun').moves[0].spraying
     assert 'never sets doFan; it sets: dogun dohorn' in refusal(read, body, gun_signal='doFan')
+
+
+def test_the_only_procedure_is_where_it_starts(tmp_path):
+    """Functions and traps are none; modules of older controllers have letters of ISO-8859-1."""
+    path = tmp_path / 'a.mod'
+    path.write_text(
+        f'MODULE A ! Tür\nPROC Door()\nMoveL {target(1)},v600,fine,tBell;\nENDPROC\n'
+        'FUNC num one()\nRETURN 1;\nENDFUNC\nTRAP t\nStop;\nENDTRAP\nENDMODULE\n', 'latin-1',
+    )  # fmt: skip
+    assert len(read_program(path).moves) == 1
+    with pytest.raises(RecordingError, match=r'no procedure one; its procedures: door$'):
+        read_program(path, procedure='one')
+
+
+@pytest.mark.parametrize('name', ['', '../a.mod', 'in/a.mod'])
+def test_a_list_of_modules_names_files_beside_it(tmp_path, name):
+    (tmp_path / 'p.pgf').write_text(f'<Program><Module>{name}</Module></Program>')
+    with pytest.raises(RecordingError, match=f"lists the module '{name}'; name modules that lie"):
+        read_program(tmp_path / 'p.pgf')
 
 
 def test_conditions_without_moves_do_no_harm(read):

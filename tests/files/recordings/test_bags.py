@@ -2,6 +2,8 @@
 
 import re
 import shutil
+import sqlite3
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +15,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
-from paint_deposition.files.recordings.messages import STATE_TYPE, Definition, standard
+from paint_deposition.files.recordings.messages import STATE_TEXT, STATE_TYPE, Definition, standard
 from paint_deposition.motion.part_frame import Rigid
 
 
@@ -76,6 +78,27 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
         '(--state-topic) if that is the trigger',
     )
     assert gun.notes == ()
+
+
+OLD_TYPES = {STATE_TYPE: STATE_TEXT, 'cell_msgs/msg/Valve': 'bool open\n'}
+
+
+@pytest.mark.parametrize('sourced', [True, False])
+def test_states_of_an_older_recorder_are_read_without_ros(tmp_path, monkeypatch, sourced):
+    """Its sqlite3 bags hold no definitions; those of other messages have to be installed."""
+    written, made = straight_pass(triggers=False), Messages(state_types=OLD_TYPES)
+    header = made.header(START_NS)
+    state = made.store.types[STATE_TYPE](header, True, 0.8, 0.0, 0.0, 0.0, 0, 0.0, 0.0)
+    valve = made.store.types['cell_msgs/msg/Valve'](True)
+    entries = [*pose_entries(written), ('/state', START_NS, state), ('/valve', START_NS, valve)]
+    folder = write_bag(tmp_path / 'old', entries, 'sqlite3', made)
+    with sqlite3.connect(folder / 'old.db3') as database:
+        database.execute('DELETE FROM message_definitions')
+    if not sourced:
+        monkeypatch.setitem(sys.modules, 'ament_index_python.packages', None)
+    assert pd.read_recording(folder, None, '/state').trigger_flow.tolist() == [0.8]
+    said = 'cell_msgs/msg/Valve is not installed; source the workspace that defines it'
+    assert said in refusal(folder, None, '/valve.open')
 
 
 def test_a_state_that_sprays_with_flow_0_is_noted(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.motion_files import MotionSource, read_gun_motions, read_recording
 from robot_arm import URDF
 from workbook import write_workbook
 
@@ -125,6 +125,17 @@ def test_times_of_a_clock_keep_their_nanoseconds(tmp_path):
         assert read_recording(tmp_path / 'poses.csv').stamps_ns.tolist() == [stamp, stamp]
 
 
+def test_a_time_may_have_a_minus_of_print(tmp_path):
+    rows = 't,x,y,z,qx,qy,qz,qw\n−0.5,0,0,0,0,0,0,1\n0,1,0,0,0,0,0,1\n'
+    (tmp_path / 'poses.csv').write_text(rows)
+    assert read_recording(tmp_path / 'poses.csv').stamps_ns.tolist() == [-500_000_000, 0]
+
+
+def test_one_table_is_the_motion_of_one_gun():
+    with pytest.raises(RecordingError, match=r'plain\.csv is no bag and has the motion of one'):
+        read_gun_motions([LAYOUTS / 'plain.csv'], MotionSource(), ['a', 'b'])
+
+
 def test_the_frame_of_the_poses_is_read(tmp_path):
     text = 't,x,y,z,qx,qy,qz,qw,frame_id\n0,0,0,0,0,0,0,1,base\n1,1,0,0,0,0,0,1,base\n'
     (tmp_path / 'poses.csv').write_text(text)
@@ -132,6 +143,9 @@ def test_the_frame_of_the_poses_is_read(tmp_path):
     (tmp_path / 'poses.csv').write_text(text.replace('base\n1', 'world\n1'))
     with pytest.raises(RecordingError, match=r'poses\.csv: poses in frames base, world'):
         read_recording(tmp_path / 'poses.csv')
+
+
+PASSES = 'x,y,z,qx,qy,qz,qw,speed\n0,0,0,0,0,0,1,1\n'
 
 
 @pytest.mark.parametrize(
@@ -152,6 +166,11 @@ def test_the_frame_of_the_poses_is_read(tmp_path):
         ('t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,0,0,0,0,1\n', 'line 2: 12 values under 8 column'),
         ('t,x,y,z,qx,qy,qz,qw\n8:15:02,0,0,0,0,0,0,1\n', "the time of day '8:15:02'; give sec"),
         ('t,x,y,z,qx,qy,qz,qw\ntrue,0,0,0,0,0,0,1\n', 'has a word for a number'),
+        (f'{PASSES}1,0,0,0,0,0,0,1\n',
+         'line 3: 1 0 0 0 0 0 0 is no pose; give seven numbers'),
+        (f'{PASSES}1,0,0,0,0,0,0.9,1\n', 'line 3: 1 0 0 0 0 0 0.9'),
+        (f'{PASSES}nan,0,0,0,0,0,1,1\n', 'line 3: nan 0 0'),
+        (f'{PASSES}1,0,0,0,0,0,1,inf\n', 'speed inf m/s; give'),
         ('t,x,y,z,qx,qy,qz,qw,flow [ml/min]\n0,0,0,0,0,0,0,1,300\n', 'relative to the calibrated'),
     ],
 )  # fmt: skip

@@ -106,7 +106,11 @@ def _contents(
     from paint_deposition.files.recordings.bags import BOOL_TYPE
     from paint_deposition.files.recordings.messages import STATE_TYPE
     from paint_deposition.files.recordings.pose_topics import sources_of_poses
-    from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
+    from paint_deposition.files.tables.poses import (
+        holds_quaternions,
+        is_pose_table,
+        may_hold_poses,
+    )
     from paint_deposition.files.tables.readings import holds_readings
     from paint_deposition.files.tables.sheets import is_gauge_file
     from paint_deposition.request import validate
@@ -116,7 +120,8 @@ def _contents(
         _only('a mesh', 'mesh_scale', 'body')
         return _mesh_contents(path, part)
     is_table = is_pose_table(path)
-    of_readings = is_table and (points_file or holds_readings(path) or not may_hold_poses(path))
+    of_readings = is_table and not holds_quaternions(path)
+    of_readings &= bool(points_file) or holds_readings(path) or not may_hold_poses(path)
     if is_gauge_file(path) or of_readings:
         _only('gauge readings', 'points_file')
         return _readings_contents(path, points_file)

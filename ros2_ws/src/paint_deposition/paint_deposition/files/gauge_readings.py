@@ -95,8 +95,7 @@ def read_points(path: str | Path, unit: str | None = None) -> dict[str, np.ndarr
 
     ``unit`` is 'm', 'mm' or 'cm' where the headings have none.
     """
-    given = Layout(unit={'position': LENGTHS[unit]} if unit else {})
-    points = MeasuringPoints.read(Path(path), given, None)
+    points = MeasuringPoints.read(Path(path), Layout(), None, LENGTHS[unit] if unit else None)
     return dict(zip(points.labels, points.positions_m, strict=True))
 
 
@@ -111,8 +110,13 @@ class MeasuringPoints:
     words: str
 
     @staticmethod
-    def read(path: Path, layout: Layout, surface: Surface | None) -> 'MeasuringPoints':
-        """Read a list: point label and x, y, z, or from_left, height."""
+    def read(
+        path: Path, layout: Layout, surface: Surface | None, default_m: float | None = None
+    ) -> 'MeasuringPoints':
+        """Read a list: point label and x, y, z, or from_left, height.
+
+        ``default_m`` is the unit of places whose headings have none [m].
+        """
         try:
             read = ReadingTable.read(path, False, Layout(unit=layout.unit))
         except ReadingsError:
@@ -121,6 +125,9 @@ class MeasuringPoints:
             if not (layout.decimal or layout.sheet):
                 raise
             read = ReadingTable.read(path, False, own)
+        columns = [k for axis in (*AXES, *ON_FACE) for k in read.at.get(axis, [])]
+        if default_m and not any(read.headings[k].unit for k in columns):
+            read.layout = replace(read.layout, unit={'position': default_m})
         positions, normals, place_words = _places(read, surface)
         labels = read.labels
         if labels is None:
@@ -242,7 +249,7 @@ def write_predictions(path: str | Path, readings: Readings, predicted_um: np.nda
     """Write the columns of the readings' file and ``predicted_um`` (N,), whole or not at all.
 
     A row with several readings is written once: they are at one place. Layers side by side have a
-    column each, such as ``predicted_um base``. Numbers have a decimal point, as in the file or not.
+    column each, such as ``predicted_um base``. Numbers have a decimal point.
     """
     read = ReadingTable.read(Path(readings.source), True, Layout(), readings.point)
     _, row, layer, _ = read.films_um()

@@ -19,7 +19,7 @@ from paint_deposition.files.recordings.messages import JOINT_TYPE
 from paint_deposition.files.recordings.pose_topics import lookups, read_frames
 from paint_deposition.files.tables.pose_columns import CONVENTIONS, ROTATION_WORDS
 from paint_deposition.files.tables.poses import is_pose_table, read_pose_table
-from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_frame, is_pose, moved
+from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.request import MotionOptions, validate
 
@@ -104,7 +104,11 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     path = Path(path)
     if is_rapid(path):
         source.require_kind(path, 'a RAPID module')
-        recorded = program_trajectory(read_program(path, source.gun_signal, source.procedure))
+        program = read_program(path, source.gun_signal, source.procedure)
+        try:
+            recorded = program_trajectory(program)
+        except RecordingError as error:
+            raise RecordingError(f'{path}: {error}') from None
     elif is_pose_table(path):
         recorded = read_table(path, source)
     elif maker := OTHER_PROGRAMS.get(path.suffix.lower()):
@@ -174,6 +178,11 @@ def read_gun_motions(
             f'{len(files)} files for {len(guns)} atomizers: give one with all of them, or one for '
             'each'
         )
+    if len(guns) > len(files) and (is_rapid(files[0]) or is_pose_table(files[0])):
+        raise RecordingError(
+            f'{files[0]} is no bag and has the motion of one gun, not of {len(guns)} atomizers; '
+            'give a file for each'
+        )
     if guns and (source.pose_topic or source.state_topic):
         raise RecordingError(
             'an atomizer is given by its name and by topics: leave out --atomizer, or '
@@ -235,7 +244,7 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
         of = f"'{named}'" if named else 'their own frame'
         note = f'part_pose: poses brought from {of} to the part, which stands at '
         note += words(Rigid.of(source.part_pose))
-        brought = moved(recorded, Rigid.of(source.part_pose).inverse(), part)
+        brought = at_part(recorded, source.part_pose, part)
         return replace(brought, notes=(*brought.notes, note))
     known = ''
     if bag is not None and (recorded.frames or not is_frame(named, part)):

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered
 
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
@@ -50,15 +51,19 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
     """Poses along moves, from the end of the first on, at the programmed speeds.
 
     Where the gun is not known from the moves it sprays throughout. Raises RecordingError without a
-    second move or a speed.
+    second move, and naming the line of one without a pose or a speed.
     """
     if len(moves) < 2:
         raise RecordingError('there is a single move; give a program that travels')
+    for move in moves:
+        if not is_pose(pose := [*map(float, move.position_m), *map(float, move.quaternion_xyzw)]):
+            words = ' '.join(f'{value:g}' for value in pose)
+            raise RecordingError(f'line {move.line}: {words} is no pose; give {POSE_FORMAT}')
     first = moves[0]
     times_s, positions, quaternions = [0.0], [first.position_m], [first.quaternion_xyzw]
     changes: list[tuple[float, float, int]] = []
     for before, move in pairwise(moves):
-        if not move.speed_m_per_s > 0.0:
+        if not 0.0 < move.speed_m_per_s < math.inf:
             raise RecordingError(f'line {move.line}: speed {move.speed_m_per_s:g} m/s; give one')
         turn = Rotation.from_quat([before.quaternion_xyzw, move.quaternion_xyzw])
         length_m, place_at = track(before.position_m, move.via_m, move.position_m)

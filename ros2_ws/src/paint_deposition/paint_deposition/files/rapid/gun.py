@@ -65,7 +65,9 @@ class Gun(Interpreter):
         elif any(i.name.startswith('paint') for i in reached):
             signals = []
         elif len(signals) > 1:
-            raise RecordingError(f'{start.source} sets {words}; say which of them opens the gun')
+            raise RecordingError(
+                f'{start.source} sets {words}; give the one that opens the gun as gun_signal'
+            )
         self.program = RapidProgram(name, ''.join(signals))
         self.is_open, self.flow = False, 1.0
         self.brush: int | None = None  # None: no brush selected yet

@@ -154,7 +154,7 @@ class Bag:
             connection = next(c for c in self._reader.connections if c.topic == topic)
             store = get_typestore(definitions.STANDARD_STORE if self._is_ros1 else Stores.EMPTY)
             form, text = connection.msgdef
-            standard = get_typestore(definitions.STANDARD_STORE).fielddefs
+            standard = definitions.own_types().fielddefs
             if form == MessageDefinitionFormat.IDL:
                 types = get_types_from_idl(text)
             elif form == MessageDefinitionFormat.MSG:

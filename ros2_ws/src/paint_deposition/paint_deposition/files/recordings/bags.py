@@ -134,7 +134,8 @@ def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarr
     """
     signal, settings = Signal.parse(name), dict[str, float]()
     topic = bag.find(signal.topic) if signal else None
-    if signal is None or topic is None or topic.type in (STATE_TYPE, BOOL_TYPE):
+    is_state = topic is not None and topic.type in (STATE_TYPE, BOOL_TYPE)
+    if signal is None or topic is None or (is_state and signal == Signal(signal.topic, '')):
         topic = choose_state_topic(bag, name)
         by_log_time = topic.type == BOOL_TYPE
         changes, settings, notes = _changes_of_states(bag, topic)

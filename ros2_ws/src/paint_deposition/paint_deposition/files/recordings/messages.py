@@ -100,12 +100,12 @@ def standard(message_type: str) -> Definition:
 
 def _share_file(message_type: str, suffix: str) -> Path:
     # ROS is imported where it is used: reading and writing bags must work without it.
-    from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
-
     try:
+        from ament_index_python.packages import get_package_share_directory
+
         package, kind, name = message_type.split('/')
         path = Path(get_package_share_directory(package)) / kind / f'{name}{suffix}'
-    except (ValueError, PackageNotFoundError):
+    except (ValueError, ModuleNotFoundError, LookupError):  # without ROS, or without the package
         raise RecordingError(
             f'{message_type} is not installed; source the workspace that defines it'
         ) from None

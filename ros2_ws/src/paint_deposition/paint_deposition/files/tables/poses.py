@@ -1,5 +1,6 @@
 """A table of poses as a trajectory: timed poses, or programmed passes with their speeds."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from paint_deposition.files.tables.pose_columns import (
     QUATERNION,
     ROLL_PITCH_YAW,
     ROTATION_VECTOR,
+    SCALAR_FIRST,
     PoseTable,
     column_name,
     read_rotations,
@@ -42,11 +44,21 @@ def is_pose_table(path: Path) -> bool:
 
 
 def may_hold_poses(path: Path) -> bool:
-    """Whether a table has a column of times, speeds or angles, as no table of readings has."""
+    """Whether a table has a column of times, speeds or angles, as few tables of readings have."""
     names = {*TIME, *SPEED, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW}
+    return _has(path, lambda columns: len(columns & names))
+
+
+def holds_quaternions(path: Path) -> bool:
+    """Whether a table has the columns of a quaternion, as no table of readings has."""
+    return _has(path, lambda columns: int({*QUATERNION} <= columns or {*SCALAR_FIRST} <= columns))
+
+
+def _has(path: Path, count: Callable[[set[str]], int]) -> bool:
+    """Whether some headings of a table have columns that are counted."""
 
     def known(headings: list[Heading]) -> int:
-        return sum(column_name(heading) in names for heading in translated(headings))
+        return count({column_name(heading) for heading in translated(headings)})
 
     return find_table(path, RecordingError, known)[1] is not None
 
