@@ -24,7 +24,7 @@ from paint_deposition.files.tables.gauge_formats import (
 )
 from paint_deposition.files.zones_file import ZoneEntry
 from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
-from paint_deposition.request import OnePart
+from paint_deposition.request import OnePart, bound
 
 MOTION = set(MotionSource.model_fields)
 PART = set(OnePart.model_fields)
@@ -104,9 +104,9 @@ def _bounds(said: dict[str, Any]) -> str:
         low, above = kind.get('minimum'), kind.get('exclusiveMinimum')
         high = kind.get('maximum')
         if above is not None:
-            return f'above {above:.10g}' if high is None else f'above {above:.10g} to {high:.10g}'
+            return f'above {bound(above)}' + ('' if high is None else f' to {bound(high)}')
         if low is not None:
-            return f'{low:.10g} or more' if high is None else f'{low:.10g} to {high:.10g}'
+            return f'{bound(low)} or more' if high is None else f'{bound(low)} to {bound(high)}'
     return ''
 
 

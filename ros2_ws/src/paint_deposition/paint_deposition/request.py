@@ -271,6 +271,11 @@ def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
     return f'{place}{key} is {shown}; expected {choice}{_expected(field, numbers)}{more}'
 
 
+def bound(value: float) -> str:
+    """The end of a range, a whole number with all its digits."""
+    return f'{value:.10g}' if float(value).is_integer() else f'{value:g}'
+
+
 def _takes_a(field: FieldInfo, kinds: tuple[type, ...]) -> bool:
     """Whether a field takes one number of these kinds, or none."""
     return field.annotation in (*kinds, *(kind | None for kind in kinds))
@@ -290,7 +295,7 @@ def _expected(field: FieldInfo, numbers: tuple[type, ...] = (float,)) -> str:
         if isinstance(bound, Ge | Gt | Le | Lt):
             limits |= asdict(bound)
     if 'ge' in limits and 'le' in limits:
-        return f'a number {limits["ge"]:.10g} to {limits["le"]:.10g}: {means}'
+        return f'a number {bound(limits["ge"])} to {bound(limits["le"])}: {means}'
     words = {'gt': 'above', 'ge': 'of at least', 'lt': 'below', 'le': 'up to'}
-    bounds = ' and '.join(f'{words[k]} {limits[k]:.10g}' for k in words if k in limits)
+    bounds = ' and '.join(f'{words[k]} {bound(limits[k])}' for k in words if k in limits)
     return f'a number {bounds}: {means}'.replace('number :', 'number:')

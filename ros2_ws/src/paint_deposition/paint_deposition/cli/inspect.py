@@ -120,8 +120,10 @@ def _contents(
         _only('a mesh', 'mesh_scale', 'body')
         return _mesh_contents(path, part)
     is_table = is_pose_table(path)
-    of_readings = is_table and not holds_quaternions(path)
-    of_readings &= bool(points_file) or holds_readings(path) or not may_hold_poses(path)
+    of_readings = (
+        is_table and not holds_quaternions(path)
+        and (points_file or holds_readings(path) or not may_hold_poses(path))
+    )  # fmt: skip
     if is_gauge_file(path) or of_readings:
         _only('gauge readings', 'points_file')
         return _readings_contents(path, points_file)
