@@ -184,6 +184,12 @@ def test_inspect_a_real_program(shared_data):
     assert content['moves'][0]['position_m'] == [0.61391, 2.32615, 1.04068]
 
 
+def test_the_name_of_a_file_is_no_option(panel, tmp_path):
+    path = tmp_path / 'part_pose.csv'
+    done = paint('simulate', '--mesh', panel, '--trajectory', path, '-o', tmp_path / 'out')
+    assert_refused(done, f'{path}: no such file')
+
+
 def test_a_program_has_no_topics_and_a_bag_no_gun_signal(tmp_path):
     module = tmp_path / 'passes.mod'
     module.write_text('')

@@ -50,6 +50,17 @@ def test_every_storage_and_spelling_of_the_topic(tmp_path, storage):
         assert same(pd.read_recording(path, topic), written)
 
 
+def test_a_topic_without_poses_is_no_candidate(tmp_path):
+    written = straight_pass(triggers=False)
+    with RunWriter(tmp_path / 'run') as run:
+        for topic in ('/empty', '/p'):
+            run.add_topic(RunTopic(topic, POSE, standard(POSE)))
+        messages = Messages()
+        for topic, stamp, message in pose_entries(written, '/p'):
+            run.write(topic, bytes(messages.serialised(message)), stamp, stamp)
+    assert same(pd.read_recording(tmp_path / 'run'), written)
+
+
 def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     written, messages = straight_pass(triggers=False), Messages()
     entries = pose_entries(written, delay_ns=3_000_000)

@@ -121,10 +121,12 @@ ONE_JOINT = (
 @pytest.mark.parametrize(
     ('text', 'words'),
     [
-        ('<robot name="a"><link name="b"/>', 'has no'),
+        ('<robot name="a"><link name="b"/></robot>', 'has no'),
+        ('<robot name="a"><link name="tool0"/>', 'is no URDF'),
+        (ONE_JOINT.format(axis='0 0 1', speed=1).replace('revolute', 'fixed'), 'no joint between'),
         ('nothing', 'is no URDF'),
         ('<robot xmlns:xacro="http://x"><xacro:include/></robot>', 'is xacro; run: xacro'),
-        (ONE_JOINT.format(axis='0 0 0', speed=1), "axis of joint 'j' is 0 0 0; give a direction"),
+        (ONE_JOINT.format(axis='0 0 0', speed=1), "axis of joint 'j' is 0 0 0; give one"),
         (ONE_JOINT.format(axis='0 0 1', speed='fast'), "velocity of joint 'j' is 'fast'; give a"),
         (ONE_JOINT.format(axis='0 0 1', speed='nan'), "velocity of joint 'j' is 'nan'; give a"),
     ],

@@ -46,6 +46,8 @@ def test_every_layout_is_the_same_motion(path):
     [
         ('Gun on', ON, {}), ('flow', [0, 0.9, 1.1, 0, 0], {}),
         ('DO_12', ON, {'state_topic': 'DO_12'}),
+        ('flow', [0, 0.9, 1.1, 0, 0], {'state_topic': 'flow'}),
+        ('flow [ml/min]', ON, {'state_topic': 'flow [ml/min]'}),
         ('DO_12,flow', ['0,0', '1,0.9', '1,1.1', '0,0', '0,0'], {'state_topic': 'DO_12'}),
     ],
 )  # fmt: skip

@@ -271,7 +271,7 @@ def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
     return f'{place}{key} is {shown}; expected {choice}{_expected(field, numbers)}{more}'
 
 
-def bound(value: float) -> str:
+def range_end(value: float) -> str:
     """The end of a range, a whole number with all its digits."""
     return f'{value:.10g}' if float(value).is_integer() else f'{value:g}'
 
@@ -295,7 +295,7 @@ def _expected(field: FieldInfo, numbers: tuple[type, ...] = (float,)) -> str:
         if isinstance(bound, Ge | Gt | Le | Lt):
             limits |= asdict(bound)
     if 'ge' in limits and 'le' in limits:
-        return f'a number {bound(limits["ge"])} to {bound(limits["le"])}: {means}'
+        return f'a number {range_end(limits["ge"])} to {range_end(limits["le"])}: {means}'
     words = {'gt': 'above', 'ge': 'of at least', 'lt': 'below', 'le': 'up to'}
-    bounds = ' and '.join(f'{words[k]} {bound(limits[k])}' for k in words if k in limits)
+    bounds = ' and '.join(f'{words[k]} {range_end(limits[k])}' for k in words if k in limits)
     return f'a number {bounds}: {means}'.replace('number :', 'number:')

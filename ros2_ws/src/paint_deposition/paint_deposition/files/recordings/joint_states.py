@@ -33,7 +33,8 @@ T = TypeVar('T')
 class Robot:
     """The kinematic chain from a robot's base link to its tip link, joints of pytransform3d.
 
-    A recording may have ``joint_prefix`` before the names of the joints, or lack it, and have
+    ``fastest`` are the speeds of those that move [rad/s or m/s], infinite where none is said. A
+    recording may have ``joint_prefix`` before the names of the joints, or lack it, and have
     angles and lengths in other units than rad and m, where it does not say them itself.
     """
 
@@ -41,6 +42,7 @@ class Robot:
     base: str
     tip: str
     chain: list[Any]
+    fastest: Mapping[str, float]
     joint_prefix: str = ''
     angle_unit: str | None = None
     length_unit: str | None = None
@@ -64,6 +66,10 @@ class Robot:
             raise RecordingError(f'{path} is xacro; run: xacro {path} > robot.urdf')
         try:
             _, links, joints = parse_urdf(text)
+            limits = {
+                joint.get('name', ''): joint.find('limit')
+                for joint in ElementTree.fromstring(text).iter('joint')
+            }
         except Exception as error:  # whatever the XML provokes in the parser
             raise RecordingError(f'{path} is no URDF ({" ".join(str(error).split())})') from None
         parents = nx.DiGraph([(joint.child, joint.parent, {'joint': joint}) for joint in joints])
@@ -81,13 +87,26 @@ class Robot:
             raise RecordingError(f"{path}: link '{tip}' does not hang on '{base}'; give base_link")
         way = nx.utils.pairwise(nx.shortest_path(parents, tip, base))
         chain = [parents.edges[pair]['joint'] for pair in way][::-1]
-        for joint in chain:
-            if joint.joint_type != 'fixed' and not np.linalg.norm(joint.joint_axis) > 0.0:
+        fastest = {}
+        for joint in (joint for joint in chain if joint.joint_type != 'fixed'):
+            name, limit = joint.joint_name, limits.get(joint.joint_name)
+            if not 0.0 < np.linalg.norm(joint.joint_axis) < np.inf:
                 axis = ' '.join(f'{value:g}' for value in joint.joint_axis)
+                raise RecordingError(f"{path}: the axis of joint '{name}' is {axis}; give one")
+            said, speed = '0' if limit is None else limit.get('velocity', '0'), np.nan
+            with suppress(ValueError):
+                speed = float(said)
+            if not speed >= 0.0:
                 raise RecordingError(
-                    f"{path}: the axis of joint '{joint.joint_name}' is {axis}; give a direction"
+                    f"{path}: the velocity of joint '{name}' is {quoted(said)}; give a number of "
+                    '0 or more'
                 )
-        return Robot(path, base, tip, chain)
+            fastest[name] = speed or np.inf
+        if not fastest:
+            raise RecordingError(
+                f"{path}: no joint between '{base}' and '{tip}' moves; give base_link and tip_link"
+            )
+        return Robot(path, base, tip, chain, fastest)
 
     @property
     def moving_joints(self) -> list[str]:
@@ -106,25 +125,11 @@ class Robot:
                 frame = np.eye(4)
         axes = np.array([joint.joint_axis for joint in moving])
         lower, upper = np.array([joint.limits for joint in moving]).T
-        root = ElementTree.parse(self.path).getroot()
-        limits = {joint.get('name', ''): joint.find('limit') for joint in root.iter('joint')}
-        fastest = {}
-        for name in self.moving_joints:
-            limit = limits.get(name)
-            said = '0' if limit is None else limit.get('velocity', '0')
-            fastest[name] = np.nan
-            with suppress(ValueError):
-                fastest[name] = float(said)
-            if not fastest[name] >= 0.0:
-                raise RecordingError(
-                    f"{self.path}: the velocity of joint '{name}' is {quoted(said)}; give a "
-                    'number of 0 or more'
-                )
         return Arm(
             tuple(self.moving_joints), np.array([*frames, frame]),
             axes / np.linalg.norm(axes, axis=1, keepdims=True),
             np.array([joint.joint_type == 'prismatic' for joint in moving]), lower, upper,
-            np.array([value or np.inf for value in fastest.values()]),
+            np.array([*self.fastest.values()]),
         )  # fmt: skip
 
     def recorded_joints(

@@ -189,7 +189,8 @@ def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
         trigger, flow = table.find(*TRIGGER), table.find(*FLOW)
     elif name.strip() in texts:
         trigger, flow = texts.index(name.strip()), table.find(*FLOW)
-        flow = None if flow == trigger else flow
+        if trigger == flow:  # with a unit it says only whether the gun is on
+            trigger, flow = (None, flow) if table.units([flow]) == {''} else (trigger, None)
     else:
         raise RecordingError(f'no column is called {name}; {did_you_mean(name, texts)}')
     if trigger is None and flow is None:
