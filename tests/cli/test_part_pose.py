@@ -197,6 +197,11 @@ def test_touched_points_give_the_pose_in_three_forms(tables):
     assert np.allclose(figures['part_pose'], TOUCHED_POSE.values, atol=2e-4)
     assert figures['rms_m'] < 2e-4
     assert set(figures['residuals_m']) == set(POINTS)
+    # The unit that is given is that of headings without.
+    assert ran('locate', *tables, '--pose-unit', 'mm').stdout == done.stdout
+    bare = tables[3].read_text().replace('x_mm,y_mm,z_mm', 'x,y,z')
+    tables[3].write_text(bare)
+    assert ran('locate', *tables, '--pose-unit', 'mm').stdout == done.stdout
 
 
 def test_bad_points_are_refused_with_their_files(tables, tmp_path):

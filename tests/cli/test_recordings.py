@@ -75,6 +75,11 @@ def test_a_table_of_poses_says_what_was_understood(tmp_path):
     assert told['high_m'] == [0.095, 0.0, 0.0]
 
 
+def test_a_table_with_quaternions_is_one_of_poses(tmp_path):
+    (tmp_path / 'poses.csv').write_text('t,x,y,z,qx,qy,qz,qw,value\n0,0,0,0,0,0,0,1,20\n')
+    assert figures_of('inspect', tmp_path / 'poses.csv', '--json')['poses'] == 1
+
+
 def test_a_table_of_readings_says_its_zeros_repeats_and_gaps(tmp_path):
     (tmp_path / 'points.csv').write_text('no,x_m,y_m,z_m\n1,0,0,0\n2,0.5,0,0\n3,1,0,0\n4,2,0,0\n')
     (tmp_path / 'door.csv').write_text('point;DFT\n1;20,5\n1;21,5\n2;0\n3;n/a\n4;23\n')
@@ -135,6 +140,33 @@ def test_a_mesh_says_its_size_and_unit(panel, scale, words, tmp_path):
     assert box == 'x -0.600 to 0.600, y 0.000 to 0.000, z -0.400 to 0.400 m'
 
 
+def test_a_mesh_is_read_with_the_scale_and_the_body_that_are_given(panel, tmp_path):
+    trimesh.load_mesh(panel).apply_scale(1e3).export(tmp_path / 'part.stl')
+    given = ('--mesh-scale', 0.001, '--body', 'part')
+    figures = figures_of('inspect', tmp_path / 'part.stl', *given, '--json')
+    assert (figures['mesh_scale'], figures['high_m'][0]) == (0.001, pytest.approx(0.6))
+    assert 'read with --mesh-scale 0.001' in ran('inspect', tmp_path / 'part.stl', *given).stdout
+    assert_refused(paint('inspect', tmp_path / 'part.stl', '--body', 'lid'), "no body 'lid'")
+
+
+@pytest.mark.parametrize(
+    ('file', 'given', 'what'),
+    [
+        ('door.stl', '--tf a b', 'a mesh'), ('door.stl', '--max-edge-length-m 0.1', 'a mesh'),
+        ('door.csv', '--strict', 'gauge readings'),
+        ('door.csv', '--mesh-scale 1', 'gauge readings'),
+        ('door_horizontal', '--body door', 'a bag'), ('door_horizontal', '--frame-id a', 'a bag'),
+        ('poses.csv', '--tool-axis x', 'a table of poses'),
+    ],
+)  # fmt: skip
+def test_what_does_nothing_is_refused(file, given, what, tmp_path):
+    (tmp_path / 'poses.csv').write_text('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n')
+    (tmp_path / 'door.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
+    path = tmp_path / file if file.endswith('.csv') else SAMPLES / file
+    words = given.split()
+    assert_refused(paint('inspect', path, *words), f'{words[0]}: not for {what}; leave it')
+
+
 def test_a_bag_without_poses_says_where_its_motion_is(shared_data):
     done = paint('inspect', shared_data / 'bags' / 'evo_nav2_turtlebot.mcap')
     assert 'transforms: --tf TARGET SOURCE takes the motion from them' in done.stdout
@@ -150,6 +182,12 @@ def test_inspect_a_real_program(shared_data):
     assert passed_over.startswith('note: passed over, neither motion nor paint: confl (line 11)')
     content = figures_of('inspect', module, '--json')
     assert content['moves'][0]['position_m'] == [0.61391, 2.32615, 1.04068]
+
+
+def test_the_name_of_a_file_is_no_option(panel, tmp_path):
+    path = tmp_path / 'part_pose.csv'
+    done = paint('simulate', '--mesh', panel, '--trajectory', path, '-o', tmp_path / 'out')
+    assert_refused(done, f'{path}: no such file')
 
 
 def test_a_program_has_no_topics_and_a_bag_no_gun_signal(tmp_path):

@@ -156,7 +156,7 @@ def zones_of(folder, *zones, mesh='part.stl'):
     [
         ('faces: [2-3]', 'part.stl'), ('faces: [2, 3]', 'part.stl'), ('body: Floor', 'part.obj'),
         ('mesh: floor.stl', 'part.stl'), ('mesh: wound_on.stl', 'part.stl'),
-        ('mesh: part.obj, body: Floor', 'part.stl'),
+        ('mesh: part.obj, body: Floor', 'part.stl'), ('body: Floor, faces: [0-1]', 'part.obj'),
         ('box: [[-1, -1, -1], [1, 1, 1]], body: Floor', 'part.obj'),
     ],
 )  # fmt: skip
@@ -187,11 +187,14 @@ def test_the_first_zone_that_holds_a_point_has_it_and_others_none(bracket):
     ('zones', 'message'),
     [
         (('name: a, target_um: 30',), "zone 1 has no 'tolerance_um'"),
+        ((f'name: null, {BAND}, faces: [0]',), 'name is None; expected what to call it'),
+        ((f'name: 12.10, {BAND}, faces: [0]',), 'name: 12.1 is no text; put it in quotes'),
         ((f'name: a, {BAND}',), 'no place; give box, body, faces or mesh'),
         (('name: a, target_um: 5, tolerance_um: 5, faces: [0]',), 'give a smaller one'),
         ((f'name: a, {BAND}, faces: [0-x]',), "'0-x' is no number and no range"),
         ((f'name: a, {BAND}, faces: [3-1]',), 'swap the two'),
         ((f'name: a, {BAND}, faces: [0-4]',), 'no triangle 4, its last is 3'),
+        ((f'name: a, {BAND}, mesh: part.obj, faces: [0]',), 'several bodies.*name one with body'),
         ((f'name: a, {BAND}, body: Flour',), "zone 'a'.*no body 'Flour'"),
         ((f'name: a, {BAND}, box: [[1, 0, 0], [0, 1, 1]]',), 'lowest corner first'),
         ((f'name: a, {BAND}, mesh_scale: 1, faces: [0]',), 'mesh_scale has no mesh'),

@@ -179,6 +179,7 @@ def test_what_is_left_out_has_its_default(file):
         ('history: [{}, 3]', 'history.1 is 3; expected a list of mappings'),
         ('', 'model is None; expected the keys name, planar'),
         ('planar: {K2: .1, K2: .2}', 'cannot be read as YAML (line 1: found duplicate key "K2"'),
+        ('planar: {K2: 2024-13-45}', 'put such a value in quotes'),
         ('planar:\n  K2: [', 'cannot be read as YAML (line 2: '),
     ],
 )  # fmt: skip

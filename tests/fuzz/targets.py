@@ -256,5 +256,7 @@ def targets() -> dict[str, Target]:
         'zones': Target('.yaml', lambda path: pd.read_zones(path, SAMPLES / 'panel.stl'), [ZONES]),
         'sweep': Target('.yaml', read_sweep, [SWEEP], 'grid: cases: sample: vary: &a *a null'),
         'campaign': Target('.yaml', pd.read_campaign, [campaign], '&a *a <<: tf: points:'),
-        'urdf': Target('.urdf', Robot.read, [URDF.read_bytes()], '<mimic xyz="1"'),
+        'urdf': Target(
+            '.urdf', lambda path: Robot.read(path).arm, [URDF.read_bytes()], '<mimic xyz="1"'
+        ),
     }  # fmt: skip

@@ -24,7 +24,7 @@ from paint_deposition.files.tables.gauge_formats import (
 )
 from paint_deposition.files.zones_file import ZoneEntry
 from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
-from paint_deposition.request import OnePart
+from paint_deposition.request import OnePart, range_end
 
 MOTION = set(MotionSource.model_fields)
 PART = set(OnePart.model_fields)
@@ -104,9 +104,9 @@ def _bounds(said: dict[str, Any]) -> str:
         low, above = kind.get('minimum'), kind.get('exclusiveMinimum')
         high = kind.get('maximum')
         if above is not None:
-            return f'above {above:g}' if high is None else f'above {above:g} to {high:g}'
+            return f'above {range_end(above)}' + ('' if high is None else f' to {range_end(high)}')
         if low is not None:
-            return f'{low:g} or more' if high is None else f'{low:g} to {high:g}'
+            return range_end(low) + (' or more' if high is None else f' to {range_end(high)}')
     return ''
 
 

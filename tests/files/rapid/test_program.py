@@ -138,11 +138,43 @@ def test_outputs_and_triggers_switch_the_gun(read):
     assert all(move.switches == () for move in moves if move is not moves[2])
 
 
+@pytest.mark.parametrize(
+    ('on', 'off', 'stays_open'),
+    [('30', '50', True), ('50\\Start', '60\\Start', False), ('10\\Start', '95', True)],
+)
+def test_the_gun_stays_as_the_trigger_that_comes_last_leaves_it(read, on, off, stays_open):
+    """In whichever order they are written, in a move of 100 mm."""
+    triggers = f'TriggIO on,{on}\\DOp:=doGun,1;\nTriggIO off,{off}\\DOp:=doGun,0;'
+    for both in ('on\\T2:=off', 'off\\T2:=on'):
+        way = f'MoveL {target(0)},v600,fine,tBell;\nTriggL {target(100)},v600,{both},z50,tBell;'
+        moves = read(f'{triggers}\n{way}\nMoveL {target(200)},v600,fine,tBell;').moves
+        assert moves[-1].spraying == stays_open
+
+
 def test_the_gun_is_one_of_several_outputs(read):
     body = f'SetDO doHorn,1;\nSet doGun;\nMoveL {target(1)},v600,fine,tBell;'
-    assert 'sets dogun dohorn; say which of them opens the gun' in refusal(read, body)
+    assert 'sets dogun dohorn; give the one that opens the gun as' in refusal(read, body)
     assert read(body, gun_signal='doGun').moves[0].spraying
     assert 'never sets doFan; it sets: dogun dohorn' in refusal(read, body, gun_signal='doFan')
+
+
+def test_the_only_procedure_is_where_it_starts(tmp_path):
+    """Functions and traps are none; modules of older controllers have letters of ISO-8859-1."""
+    path = tmp_path / 'a.mod'
+    path.write_text(
+        f'MODULE A ! Tür\nPROC Door()\nMoveL {target(1)},v600,fine,tBell;\nENDPROC\n'
+        'FUNC num one()\nRETURN 1;\nENDFUNC\nTRAP t\nStop;\nENDTRAP\nENDMODULE\n', 'latin-1',
+    )  # fmt: skip
+    assert len(read_program(path).moves) == 1
+    with pytest.raises(RecordingError, match=r'no procedure one; its procedures: door$'):
+        read_program(path, procedure='one')
+
+
+@pytest.mark.parametrize('name', ['', '../a.mod', 'in/a.mod'])
+def test_a_list_of_modules_names_files_beside_it(tmp_path, name):
+    (tmp_path / 'p.pgf').write_text(f'<Program><Module>{name}</Module></Program>')
+    with pytest.raises(RecordingError, match=f"lists the module '{name}'; name modules that lie"):
+        read_program(tmp_path / 'p.pgf')
 
 
 def test_conditions_without_moves_do_no_harm(read):
@@ -284,6 +316,8 @@ AT_W = f'MoveL {target(0)},v100,z10,tool0\\WObj:=w;'
         (f'MoveL {target("1e400")},v100,z10,tool0;', '', 'is no position [x, y'),
         ('n:=1/0;', 'VAR num n;', 'line 4: division by zero'),
         ('SetBrush;', '', 'setbrush needs a number'),
+        ('Add reg1;', '', 'line 4: add takes 2 arguments, not 1'),
+        ('Incr;', '', 'line 4: incr takes 1 argument, not 0'),
         ('SetBrush 2.5;', '', 'line 4: setbrush takes the number of a brush, not 2.5'),
         ('TriggIO t\\DOp:=doGun;', 'VAR triggdata t;', 'triggio needs a number'),
         (f'MoveL {target(0)},v100\\V:=[1],z10,tool0;', '', 'speed is [1.0]; a number expected'),
@@ -361,6 +395,19 @@ def test_a_tool_that_only_turns_takes_its_time(motion):
     )
     assert trajectory.duration_s == pytest.approx(90.0 / 500.0, abs=1e-6)
     assert np.all(np.ptp(trajectory.positions_m, axis=0) == 0.0)
+
+
+@pytest.mark.parametrize(
+    'move',
+    [
+        f'MoveC {down(100, 100)},{down(0, 200)},v100\\T:=4,fine,tool0;',
+        f'MoveL {down(0, wxyz="0,0.8,0.6,0")},v100\\T:=4,fine,tool0;',
+        f'VelSet 50,5000;MoveL {down(100)},v100\\T:=2,fine,tool0;',
+    ],
+)
+def test_a_move_takes_the_time_that_it_is_given(motion, move):
+    trajectory = motion(f'MoveL {down(0)},v100,fine,tool0;{move}')
+    assert trajectory.duration_s == pytest.approx(4.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 import re
 import shutil
+import sqlite3
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +15,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
-from paint_deposition.files.recordings.messages import STATE_TYPE, Definition, standard
+from paint_deposition.files.recordings.messages import STATE_TEXT, STATE_TYPE, Definition, standard
 from paint_deposition.motion.part_frame import Rigid
 
 
@@ -48,6 +50,17 @@ def test_every_storage_and_spelling_of_the_topic(tmp_path, storage):
         assert same(pd.read_recording(path, topic), written)
 
 
+def test_a_topic_without_poses_is_no_candidate(tmp_path):
+    written = straight_pass(triggers=False)
+    with RunWriter(tmp_path / 'run') as run:
+        for topic in ('/empty', '/p'):
+            run.add_topic(RunTopic(topic, POSE, standard(POSE)))
+        messages = Messages()
+        for topic, stamp, message in pose_entries(written, '/p'):
+            run.write(topic, bytes(messages.serialised(message)), stamp, stamp)
+    assert same(pd.read_recording(tmp_path / 'run'), written)
+
+
 def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     written, messages = straight_pass(triggers=False), Messages()
     entries = pose_entries(written, delay_ns=3_000_000)
@@ -76,6 +89,27 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
         '(--state-topic) if that is the trigger',
     )
     assert gun.notes == ()
+
+
+OLD_TYPES = {STATE_TYPE: STATE_TEXT, 'cell_msgs/msg/Valve': 'bool open\n'}
+
+
+@pytest.mark.parametrize('sourced', [True, False])
+def test_states_of_an_older_recorder_are_read_without_ros(tmp_path, monkeypatch, sourced):
+    """Its sqlite3 bags hold no definitions; those of other messages have to be installed."""
+    written, made = straight_pass(triggers=False), Messages(state_types=OLD_TYPES)
+    header = made.header(START_NS)
+    state = made.store.types[STATE_TYPE](header, True, 0.8, 0.0, 0.0, 0.0, 0, 0.0, 0.0)
+    valve = made.store.types['cell_msgs/msg/Valve'](True)
+    entries = [*pose_entries(written), ('/state', START_NS, state), ('/valve', START_NS, valve)]
+    folder = write_bag(tmp_path / 'old', entries, 'sqlite3', made)
+    with sqlite3.connect(folder / 'old.db3') as database:
+        database.execute('DELETE FROM message_definitions')
+    if not sourced:
+        monkeypatch.setitem(sys.modules, 'ament_index_python.packages', None)
+    assert pd.read_recording(folder, None, '/state').trigger_flow.tolist() == [0.8]
+    said = 'cell_msgs/msg/Valve is not installed; source the workspace that defines it'
+    assert said in refusal(folder, None, '/valve.open')
 
 
 def test_a_state_that_sprays_with_flow_0_is_noted(tmp_path):
@@ -209,6 +243,23 @@ def test_a_part_of_a_split_bag_is_not_taken_for_the_whole(tmp_path):
     metadata.write_text(both)
     (warning,) = pd.read_recording(folder / 'pass_1.mcap', frame_id='door').warnings
     assert warning.startswith('pass_1.mcap is one of the 2 files of a split bag; give its folder')
+
+
+def test_a_file_has_the_custom_data_of_its_folder_alone(tmp_path):
+    """Not that of a folder which it was only put into; there, all of its messages count."""
+    told = {'trigger_topic': '/atomizer/state', 'messages_of_the_part': '/atomizer/pose=7'}
+    plan = write_pose_bag(tmp_path / 'plan', straight_pass(), told)
+    own = pd.read_recording(plan / 'plan_0.mcap')
+    assert (len(own), len(own.trigger_flow)) == (7, 2)
+    shutil.copy(plan / 'plan_0.mcap', plan / 'other.mcap')
+    other = pd.read_recording(plan / 'other.mcap')
+    assert (len(other), len(other.trigger_flow)) == (50, 0)
+
+
+def test_damaged_metadata_beside_a_file_is_no_traceback(tmp_path):
+    told = {'messages_of_the_part': '/atomizer/pose=seven'}
+    folder = write_pose_bag(tmp_path / 'run', straight_pass(5), told)
+    assert 'run_0.mcap is damaged (invalid literal' in refusal(folder / 'run_0.mcap')
 
 
 def test_other_files_under_a_bags_name(tmp_path):

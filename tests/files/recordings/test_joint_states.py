@@ -9,8 +9,10 @@ from scipy.spatial.transform import Rotation
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.files.recordings.pose_topics import sources_of_poses
 from paint_deposition.motion.part_frame import Rigid
 from robot_arm import JOINTS, TIP_M, URDF, sweep, tip_poses
 from scenes import stamps_ns
@@ -109,18 +111,30 @@ def test_joints_that_are_not_recorded_are_named(tmp_path):
         read_recording(bag, urdf=str(URDF))
 
 
+ONE_JOINT = (
+    '<robot name="a"><link name="base"/><link name="tool0"/><joint name="j" type="revolute">'
+    '<parent link="base"/><child link="tool0"/><axis xyz="{axis}"/>'
+    '<limit lower="-1" upper="1" velocity="{speed}"/></joint></robot>'
+)
+
+
 @pytest.mark.parametrize(
     ('text', 'words'),
     [
-        ('<robot name="a"><link name="b"/>', 'has no'),
+        ('<robot name="a"><link name="b"/></robot>', 'has no'),
+        ('<robot name="a"><link name="tool0"/>', 'is no URDF'),
+        (ONE_JOINT.format(axis='0 0 1', speed=1).replace('revolute', 'fixed'), 'no joint between'),
         ('nothing', 'is no URDF'),
         ('<robot xmlns:xacro="http://x"><xacro:include/></robot>', 'is xacro; run: xacro'),
+        (ONE_JOINT.format(axis='0 0 0', speed=1), "axis of joint 'j' is 0 0 0; give one"),
+        (ONE_JOINT.format(axis='0 0 1', speed='fast'), "velocity of joint 'j' is 'fast'; give a"),
+        (ONE_JOINT.format(axis='0 0 1', speed='nan'), "velocity of joint 'j' is 'nan'; give a"),
     ],
 )
 def test_what_is_no_robot_is_refused(text, words, tmp_path):
     (tmp_path / 'robot.urdf').write_text(text)
     with pytest.raises(RecordingError, match=words):
-        Robot.read(tmp_path / 'robot.urdf', tip='tool0')
+        _ = Robot.read(tmp_path / 'robot.urdf', tip='tool0').arm
 
 
 def test_joint_states_that_are_not_finite_are_left_out_and_counted(tmp_path):
@@ -132,6 +146,67 @@ def test_joint_states_that_are_not_finite_are_left_out_and_counted(tmp_path):
     assert '1 joint states on /joint_states with joints that are not finite' in ' '.join(
         read.warnings
     )
+
+
+def test_joints_are_known_in_whatever_order_they_are_named(tmp_path):
+    rows = rows_of()
+    rows[70:] = [(*row[:2], JOINTS[::-1], row[3][::-1]) for row in rows[70:]]
+    read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(URDF), frame_id='base_link')
+    assert np.allclose(read.positions_m, tip_poses(sweep())[0], atol=1e-9)
+    assert read.warnings == ()
+
+
+def test_joint_states_that_are_not_used_are_counted(tmp_path):
+    rows = rows_of()
+    rows[20] = (*rows[20][:3], [])
+    rows[30] = ('/joint_states', rows[29][1], *rows[30][2:])
+    rows[140:] = [(*row[:2], (*JOINTS, 'gripper'), [*row[3], 0.1]) for row in rows[140:]]
+    read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(URDF), frame_id='base_link')
+    assert len(read) == 138
+    assert [warning.split(': ', 1)[1] for warning in read.warnings] == [
+        '1 joint states on /joint_states without a position for each joint: left out',
+        '1 joint states on /joint_states stamped no later than one before: left out',
+        '11 joint states on /joint_states with another set of joints than most: left out',
+    ]
+
+
+def test_joints_that_are_never_known_together_are_named(tmp_path):
+    rows = [('/arm', stamp, JOINTS[1:], joints[1:]) for _, stamp, _, joints in rows_of()[:70]]
+    rows += [('/pan', stamp, JOINTS[:1], joints[:1]) for _, stamp, _, joints in rows_of()[80:]]
+    with pytest.raises(RecordingError, match=r'elbow on /arm until .*, shoulder_pan on /pan'):
+        read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(URDF))
+
+
+def logged_twice(messages, topic):
+    """Messages of 3 s, (stamp, message), as from a log that is played in a loop."""
+    both = [message for _, message in messages] * 2
+    return [(topic, 20_000_000 * row, message) for row, message in enumerate(both, start=1)]
+
+
+def test_joints_and_transforms_that_start_again_are_refused_and_named(tmp_path):
+    """A single one that comes late by more than a second is none of another stream."""
+    made, again = Messages(), 'the stamps start again 3.020 s after its first message; cut the bag'
+    joints = [(t, made.joints(t, names, at)) for _, t, names, at in rows_of()]
+    transforms = [
+        (t, made.transforms((t, 'world', 'tool0', [*place, *turn])))
+        for t, place, turn in zip(stamps_ns(TIMES_S), *tip_poses(sweep()), strict=True)
+    ]
+    for topic, messages, options in (
+        ('/joint_states', joints, {'urdf': str(URDF)}),
+        ('/tf', transforms, {'tf': ['world', 'tool0']}),
+    ):
+        folder = write_bag(tmp_path / f'{topic[1:]}_twice', logged_twice(messages, topic))
+        with pytest.raises(RecordingError) as refused:
+            read_recording(folder, **options)
+        assert again in str(refused.value)
+        with open_bag(folder) as bag:
+            (source,) = sources_of_poses(bag, 0.25)
+        assert source.quality is None
+        assert again in source.faults[0]
+        late = [*messages[:100], messages[20], *messages[100:]]
+        entries = [(topic, row, message) for row, (_, message) in enumerate(late)]
+        read = read_recording(write_bag(tmp_path / f'{topic[1:]}_late', entries), **options)
+        assert np.allclose(read.positions_m, tip_poses(sweep())[0], atol=1e-9)
 
 
 IO = 'cell_msgs/msg/Io'
@@ -172,6 +247,7 @@ def bag(messages, tmp_path_factory):
             ('/brush', stamp + 7_000_000_000, brush),
             ('/valve/pressure', stamp, types['std_msgs/msg/Float64'](3.0 if on else 0.0)),
             ('/closed', stamp, types['std_msgs/msg/Int32'](0 if on else 1)),
+            ('/shut', stamp, types['std_msgs/msg/Bool'](not on)),
         ]
     folder = tmp_path_factory.mktemp('cell') / 'run'
     return write_bag(folder, entries, 'sqlite3', messages)
@@ -191,6 +267,7 @@ def openings(trajectory) -> np.ndarray:
         ('/io.valves[1].open', 'trigger /io.valves[1].open is 0 to 1'),
         ('/valve/pressure', 'trigger /valve/pressure is 0 to 3'),
         ('/closed < 1', 'the gun is on where it is below 1'),
+        ('/shut < 1', 'trigger /shut is 0 to 1: the gun is on where it is below 1'),
     ],
 )
 def test_a_number_in_any_field_opens_the_gun(trigger, said, bag):
@@ -227,9 +304,10 @@ def test_the_run_of_a_part_keeps_the_order_in_which_its_states_came(tmp_path):
     told = replace(PASS, trigger_stamps_ns=stamps, trigger_flow=np.array([0.5, 1.0]))
     for custom_data, rows in ({'serial': '1'}, [0, 10]), ({}, []):
         bag = write_pose_bag(tmp_path / f'run_{len(rows)}', told, custom_data)
-        read = read_recording(bag, state_topic='/atomizer/state')
-        assert read.trigger_stamps_ns.tolist() == stamps.tolist()
-        assert read.trigger_rows.tolist() == rows
+        for path in (bag, *bag.glob('*.mcap')):
+            read = read_recording(path, state_topic='/atomizer/state')
+            assert read.trigger_stamps_ns.tolist() == stamps.tolist()
+            assert read.trigger_rows.tolist() == rows
 
 
 BELL = [0.0, 0.02, 0.31, *Rotation.from_euler('y', 0.3).as_quat()]

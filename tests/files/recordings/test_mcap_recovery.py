@@ -79,6 +79,19 @@ def test_a_cut_run_becomes_a_whole_one(tmp_path, cut_run, given):
     assert metadata['type_description_hash'] == standard(BOOL).type_hash
 
 
+@pytest.mark.parametrize(
+    'told',
+    ['a: 2024-13-45', '{a: ' * 600 + '1' + '}' * 600, 'custom_data: [1]', 'a: &a [*a]', '- 1'],
+)
+def test_odd_metadata_in_a_file_do_not_keep_it_from_being_recovered(tmp_path, told):
+    with RunWriter(tmp_path / 'run') as run:
+        run.add_topic(RunTopic('/gun', BOOL, standard(BOOL)))
+        run.write('/gun', b'\0\1\0\0\1', 1, 1)
+        run._writer.add_metadata('rosbag2', {'serialized_metadata': told})
+    recovery = recover(run.path, tmp_path / 'recovered')
+    assert recovery.counts == {'/gun': 1}
+
+
 def gun_file(path, count, chunk_bytes, compression='zstd'):
     """A file of so many triggers, 1000 ns apart, and its chunks."""
     rng, text = np.random.default_rng(8), standard(BOOL).text.encode()

@@ -55,8 +55,25 @@ def test_predictions_are_written_beside_the_columns_of_the_file(tmp_path):
     written, readings = tmp_path / 'predicted.csv', read_readings(LAYOUTS / 'fischer.txt')
     write_predictions(written, readings, np.array([1.0, 1.0, 2.0, 3.0]))
     lines = written.read_text().splitlines()
-    assert lines[1] == 'A1,"100,0","0,0","50,0","21,5","22,1",1.0000'
+    assert lines[1] == 'A1,100.0,0.0,50.0,21.5,22.1,1.0000'
     assert len(lines) == 4
+
+
+def test_labels_that_look_like_comments_are_counted(file):
+    rows = '#1,0,0,0,20\n# of the left door\n#2,1,0,0,21\n3,2,0,0,22\n'
+    readings = read_readings(file('a.csv', f'point,x_m,y_m,z_m,thickness_um\n{rows}'))
+    assert readings.point.tolist() == ['3']
+    assert 'left out: 2 rows that begin with #' in readings.understood
+
+
+def test_layers_side_by_side_are_predicted_each(file, tmp_path):
+    head, rows = 'Punkt;x [m];y [m];z [m];Basislack;Klarlack', 'A,1;0;0;0;15,5;40\nB;1;0;0;;41'
+    readings = read_readings(file('a.csv', f'{head}\n{rows}\n'))
+    assert readings.layer.tolist() == ['base', 'clear', 'clear']
+    write_predictions(tmp_path / 'predicted.csv', readings, np.array([15.0, 42.0, 43.0]))
+    lines = (tmp_path / 'predicted.csv').read_text().splitlines()
+    assert lines[0].endswith('Klarlack,predicted_um base,predicted_um clear')
+    assert lines[1:] == ['"A,1",0,0,0,15.5,40,15.0000,42.0000', 'B,1,0,0,,41,,43.0000']
 
 
 def test_spreadsheet(tmp_path):

@@ -5,6 +5,7 @@ says otherwise. The layouts of the makers follow their manuals.
 """
 
 import shutil
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -229,4 +230,13 @@ def test_what_stands_around_a_table_of_a_workbook(tmp_path, rows):
 def test_cells_that_could_mislead_are_refused(tmp_path, message):
     path = write_workbook(tmp_path / 'a.xlsx', {'S': REFUSED_CELLS[message]})
     with pytest.raises(ReadingsError, match=message):
+        read_readings(path)
+
+
+def test_files_of_one_name_in_a_zip_are_not_taken_for_each_other(tmp_path):
+    path = tmp_path / 'two.zip'
+    with zipfile.ZipFile(path, 'w') as package:
+        for folder in ('monday', 'tuesday'):
+            package.writestr(f'{folder}/door.csv', 'x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
+    with pytest.raises(ReadingsError, match=r'holds monday/door\.csv, tuesday/door\.csv;'):
         read_readings(path)

@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.motion_files import MotionSource, read_gun_motions, read_recording
+from robot_arm import URDF
 from workbook import write_workbook
 
 # A gun that sways while it goes, and is on in the middle.
@@ -24,7 +25,7 @@ ON = [0, 1, 1, 0, 0]
 LAYOUTS = Path(__file__).with_name('poses')
 SAID = {
     'kuka': {'pose_unit': 'mm'}, 'rotation_vector_deg': {'rotation': 'rotvec'},
-    'z_first': {'rotation': 'ZYX'}, 'kawasaki': {'rotation': 'kawasaki'},
+    'z_first': {'rotation': 'ZYX'}, 'kawasaki': {'rotation': 'Kawasaki'},
 }  # fmt: skip
 
 
@@ -45,6 +46,9 @@ def test_every_layout_is_the_same_motion(path):
     [
         ('Gun on', ON, {}), ('flow', [0, 0.9, 1.1, 0, 0], {}),
         ('DO_12', ON, {'state_topic': 'DO_12'}),
+        ('flow', [0, 0.9, 1.1, 0, 0], {'state_topic': 'flow'}),
+        ('flow [ml/min]', ON, {'state_topic': 'flow [ml/min]'}),
+        ('DO_12,flow', ['0,0', '1,0.9', '1,1.1', '0,0', '0,0'], {'state_topic': 'DO_12'}),
     ],
 )  # fmt: skip
 def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
@@ -53,8 +57,9 @@ def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
     (tmp_path / 'poses.csv').write_text('\n'.join([f'{head},{heading}', *lines]))
     read = read_recording(tmp_path / 'poses.csv', **options)
     assert np.array_equal(read.trigger_stamps_ns, read.stamps_ns)
-    assert np.allclose(read.trigger_flow, flows)
-    assert f'gun by {heading}' in read.notes[0]
+    expected = [float(str(flow).rsplit(',')[-1]) for flow in flows]
+    assert np.allclose(read.trigger_flow, expected)
+    assert f'gun by {heading.replace(",", " ")}' in read.notes[0]
 
 
 @pytest.mark.parametrize('axis', ['x', 'y', 'z', '-x', '-y', '-z'])
@@ -65,6 +70,21 @@ def test_the_tool_may_spray_along_another_of_its_axes(axis):
     assert sprays == pytest.approx(-column if axis[0] == '-' else column, abs=1e-6)
 
 
+def test_a_turned_tool_keeps_the_norms_by_which_damage_is_known(tmp_path):
+    rows = ['0,1,2,3,0,0,0,0.3', '1,1,2,4,0,0,0,0', '2,1,2,5,nan,0,0,1', '3,1,2,6,0,0,0,1.004']
+    (tmp_path / 'p.csv').write_text('t,x,y,z,qx,qy,qz,qw\n' + '\n'.join(rows))
+    turned = read_recording(tmp_path / 'p.csv', tool_axis='x').quaternions_xyzw
+    norms = np.linalg.norm(turned, axis=1)
+    assert norms == pytest.approx([0.3, 0.0, np.nan, 1.004], nan_ok=True)
+
+
+def test_t_beside_o_and_a_is_an_angle(tmp_path):
+    rows = ['1,2,3,10,20,30,0.5', '1,2,4,10,20,30,0.5']
+    (tmp_path / 'p.csv').write_text('x,y,z,O,A,T,speed_m_per_s\n' + '\n'.join(rows))
+    read = read_recording(tmp_path / 'p.csv', rotation='kawasaki')
+    assert read.duration_s == pytest.approx(2.0)
+
+
 def test_what_could_be_the_trigger_is_named(tmp_path):
     rows = [f'{k / 10},{k},2,3,0,0,0,1,{word},0' for k, word in enumerate(('AUS', 'EIN', 'aus'))]
     (tmp_path / 'p.csv').write_text('t,x,y,z,qx,qy,qz,qw,Pistole,DO2\n' + '\n'.join(rows))
@@ -72,6 +92,12 @@ def test_what_could_be_the_trigger_is_named(tmp_path):
     assert warning.startswith('the gun counts as always on; if Pistole is its trigger')
     read = read_recording(tmp_path / 'p.csv', state_topic='Pistole')
     assert (read.trigger_flow.tolist(), read.warnings) == ([0.0, 1.0, 0.0], ())
+
+
+def test_an_empty_table_has_no_joints_either(tmp_path):
+    (tmp_path / 'p.csv').write_text('')
+    with pytest.raises(RecordingError, match=r'no columns .* \(its first row: none\)'):
+        read_recording(tmp_path / 'p.csv', urdf=str(URDF))
 
 
 def test_a_workbook_is_a_log_too(tmp_path):
@@ -101,6 +127,17 @@ def test_times_of_a_clock_keep_their_nanoseconds(tmp_path):
         assert read_recording(tmp_path / 'poses.csv').stamps_ns.tolist() == [stamp, stamp]
 
 
+def test_a_time_may_have_a_minus_of_print(tmp_path):
+    rows = 't,x,y,z,qx,qy,qz,qw\n−0.5,0,0,0,0,0,0,1\n0,1,0,0,0,0,0,1\n'
+    (tmp_path / 'poses.csv').write_text(rows)
+    assert read_recording(tmp_path / 'poses.csv').stamps_ns.tolist() == [-500_000_000, 0]
+
+
+def test_one_table_is_the_motion_of_one_gun():
+    with pytest.raises(RecordingError, match=r'plain\.csv is no bag and has the motion of one'):
+        read_gun_motions([LAYOUTS / 'plain.csv'], MotionSource(), ['a', 'b'])
+
+
 def test_the_frame_of_the_poses_is_read(tmp_path):
     text = 't,x,y,z,qx,qy,qz,qw,frame_id\n0,0,0,0,0,0,0,1,base\n1,1,0,0,0,0,0,1,base\n'
     (tmp_path / 'poses.csv').write_text(text)
@@ -108,6 +145,9 @@ def test_the_frame_of_the_poses_is_read(tmp_path):
     (tmp_path / 'poses.csv').write_text(text.replace('base\n1', 'world\n1'))
     with pytest.raises(RecordingError, match=r'poses\.csv: poses in frames base, world'):
         read_recording(tmp_path / 'poses.csv')
+
+
+PASSES = 'x,y,z,qx,qy,qz,qw,speed\n0,0,0,0,0,0,1,1\n'
 
 
 @pytest.mark.parametrize(
@@ -128,6 +168,11 @@ def test_the_frame_of_the_poses_is_read(tmp_path):
         ('t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,0,0,0,0,1\n', 'line 2: 12 values under 8 column'),
         ('t,x,y,z,qx,qy,qz,qw\n8:15:02,0,0,0,0,0,0,1\n', "the time of day '8:15:02'; give sec"),
         ('t,x,y,z,qx,qy,qz,qw\ntrue,0,0,0,0,0,0,1\n', 'has a word for a number'),
+        (f'{PASSES}1,0,0,0,0,0,0,1\n',
+         'line 3: 1 0 0 0 0 0 0 is no pose; give seven numbers'),
+        (f'{PASSES}1,0,0,0,0,0,0.9,1\n', 'line 3: 1 0 0 0 0 0 0.9'),
+        (f'{PASSES}nan,0,0,0,0,0,1,1\n', 'line 3: nan 0 0'),
+        (f'{PASSES}1,0,0,0,0,0,1,inf\n', 'speed inf m/s; give'),
         ('t,x,y,z,qx,qy,qz,qw,flow [ml/min]\n0,0,0,0,0,0,0,1,300\n', 'relative to the calibrated'),
     ],
 )  # fmt: skip
@@ -151,3 +196,5 @@ def test_options_of_other_kinds_of_files_are_refused():
         read_recording(LAYOUTS / 'plain.csv', '/pose')
     with pytest.raises(RecordingError, match="rotation: 'zxq' is no convention; give 'rotvec'"):
         read_recording(LAYOUTS / 'plain.csv', rotation='zxq')
+    with pytest.raises(RecordingError, match="'ZZX' is no convention"):
+        read_recording(LAYOUTS / 'plain.csv', rotation='ZZX')

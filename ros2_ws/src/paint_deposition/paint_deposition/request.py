@@ -11,7 +11,14 @@ from dataclasses import asdict
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
 
 from paint_deposition.errors import PaintError, PlanError, did_you_mean, quoted
@@ -19,6 +26,16 @@ from paint_deposition.errors import PaintError, PlanError, did_you_mean, quoted
 Verb = TypeVar('Verb', bound=Callable)
 Made = TypeVar('Made', bound=BaseModel)
 Text = Annotated[str, Field(min_length=1)]
+
+
+def _as_text(value: Any) -> str:
+    if isinstance(value, bool | float | list | dict):
+        raise ValueError(f'{quoted(value)} is no text; put it in quotes')
+    return '' if value is None else str(value)
+
+
+# A name, a date or a whole number, read as text; a number such as 12.10 has lost its last digit.
+Name = Annotated[str, BeforeValidator(_as_text)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
@@ -169,7 +186,10 @@ class MotionOptions(RobotArm, extra='forbid'):
         None, 'Axis of the recorded tool along which it sprays, x for a KUKA; default: z.'
     )
     frame_id: Text | None = given(None, "Name of the part's frame; default: part.")
-    strict: bool = given(False, 'Refuse a recording with a pose or state that would be left out.')
+    strict: bool = given(
+        False, 'Refuse a recording with a pose that nothing places, or with states or joints that '
+        'would be left out.'
+    )  # fmt: skip
     part_pose: Annotated[list[Number], Field(min_length=7, max_length=7)] | None = given(
         None, 'Where the part stands in the frame of the poses: x y z [m] and the unit quaternion '
         'qx qy qz qw.',
@@ -251,6 +271,11 @@ def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
     return f'{place}{key} is {shown}; expected {choice}{_expected(field, numbers)}{more}'
 
 
+def range_end(value: float) -> str:
+    """The end of a range, a whole number with all its digits."""
+    return f'{value:.10g}' if float(value).is_integer() else f'{value:g}'
+
+
 def _takes_a(field: FieldInfo, kinds: tuple[type, ...]) -> bool:
     """Whether a field takes one number of these kinds, or none."""
     return field.annotation in (*kinds, *(kind | None for kind in kinds))
@@ -270,7 +295,7 @@ def _expected(field: FieldInfo, numbers: tuple[type, ...] = (float,)) -> str:
         if isinstance(bound, Ge | Gt | Le | Lt):
             limits |= asdict(bound)
     if 'ge' in limits and 'le' in limits:
-        return f'a number {limits["ge"]:g} to {limits["le"]:g}: {means}'
+        return f'a number {range_end(limits["ge"])} to {range_end(limits["le"])}: {means}'
     words = {'gt': 'above', 'ge': 'of at least', 'lt': 'below', 'le': 'up to'}
-    bounds = ' and '.join(f'{words[k]} {limits[k]:g}' for k in words if k in limits)
+    bounds = ' and '.join(f'{words[k]} {range_end(limits[k])}' for k in words if k in limits)
     return f'a number {bounds}: {means}'.replace('number :', 'number:')

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 import paint_deposition as pd
 from paint_deposition.cli import options
@@ -66,51 +67,78 @@ def inspect_command(
     if path is None or (trajectory and recording):
         raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
     if part.mesh is not None:
-        figures, lines = _gun_on_part(part, path, motion, max_pose_gap_s, output, model_file)
+        if points_file:
+            raise click.UsageError('--points is for gauge readings; leave it or --mesh out')
+        made = _gun_on_part(part, path, motion, max_pose_gap_s, output, model_file)
+        (figures, lines), model = made
+        files = {'mesh': str(part.mesh), 'trajectory': str(path)}
     else:
-        if output or model_file:
-            raise click.UsageError('--out and --model need --mesh')
-        figures, lines = _contents(path, points_file, motion, max_pose_gap_s)
-        figures |= {'provenance': origin(files={'recording': path})}
-    click.echo(json_text(figures) if as_json else '\n'.join(lines))
+        model, files = None, {'recording': str(path)}
+        figures, lines = _contents(path, points_file, part, motion, max_pose_gap_s)
+    if as_json:  # the digests of long recordings take their time
+        lines = [json_text(figures | {'provenance': origin(model, files)})]
+    click.echo('\n'.join(lines))
+
+
+def _only(what: str, *names: str) -> None:
+    """Refuse the options that were given and do nothing for what is shown; these do something."""
+    context = click.get_current_context()
+    known = {*names, 'recording', 'trajectory', 'as_json', 'allow_effects'}
+    given = [
+        one.opts[0] for one in context.command.params
+        if one.name and one.name not in known
+        and context.get_parameter_source(one.name) is ParameterSource.COMMANDLINE
+    ]  # fmt: skip
+    if given:
+        raise click.UsageError(f'{" ".join(given)}: not for {what}; leave it out, or give --mesh')
 
 
 def _contents(
-    path: Path, points_file: Path | None, motion: dict[str, Any], max_pose_gap_s: float
-) -> Contents:
+    path: Path, points_file: Path | None, part: options.Part, motion: dict[str, Any],
+    max_pose_gap_s: float,
+) -> Contents:  # fmt: skip
     """What a module, table, mesh or bag holds."""
     from paint_deposition.errors import RecordingError
     from paint_deposition.files.meshes import SUFFIXES
-    from paint_deposition.files.motion_files import MotionSource, read_table
+    from paint_deposition.files.motion_files import MOTION_KINDS, MotionSource, read_table
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_files import open_bag
     from paint_deposition.files.recordings.bags import BOOL_TYPE
     from paint_deposition.files.recordings.messages import STATE_TYPE
     from paint_deposition.files.recordings.pose_topics import sources_of_poses
-    from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
+    from paint_deposition.files.tables.poses import (
+        holds_quaternions,
+        is_pose_table,
+        may_hold_poses,
+    )
     from paint_deposition.files.tables.readings import holds_readings
     from paint_deposition.files.tables.sheets import is_gauge_file
     from paint_deposition.request import validate
 
     source = validate(MotionSource, 'motion', motion, RecordingError)
     if path.suffix.lower() in SUFFIXES:
-        return _mesh_contents(path)
+        _only('a mesh', 'mesh_scale', 'body')
+        return _mesh_contents(path, part)
     is_table = is_pose_table(path)
-    of_readings = is_table and (points_file or holds_readings(path) or not may_hold_poses(path))
+    of_readings = (
+        is_table and not holds_quaternions(path)
+        and (points_file or holds_readings(path) or not may_hold_poses(path))
+    )  # fmt: skip
     if is_gauge_file(path) or of_readings:
+        _only('gauge readings', 'points_file')
         return _readings_contents(path, points_file)
     if is_table:
+        _only('a table of poses', *MOTION_KINDS, 'max_pose_gap_s')
         poses = read_table(path, source)
         print_all('warning', poses.warnings)
         return _table_contents(poses, max_pose_gap_s)
     kind = 'a RAPID module' if is_rapid(path) else 'a bag'
     source.require_kind(path, kind)
-    of_program = {name: motion.pop(name) for name in ('gun_signal', 'procedure')}
-    if any(motion.values()):
-        raise click.UsageError(f'how the motion of {kind} is read needs --mesh')
     if is_rapid(path):
-        program = read_program(path, **of_program)
+        _only(kind, 'gun_signal', 'procedure')
+        program = read_program(path, source.gun_signal, source.procedure)
         return asdict(program), [program_as_text(program)]
+    _only(kind, 'max_pose_gap_s')
     with open_bag(path) as bag:
         topics, sources = bag.topics, [*sources_of_poses(bag, max_pose_gap_s)]
     triggers = [t.name for kind in (STATE_TYPE, BOOL_TYPE) for t in topics if t.type == kind]
@@ -121,14 +149,15 @@ def _contents(
     return figures, _bag_lines(path, topics, sources, triggers)
 
 
-def _mesh_contents(path: Path) -> Contents:
-    """A mesh: its size in the unit that it has, or seems to have, and its bodies."""
+def _mesh_contents(path: Path, part: options.Part) -> Contents:
+    """A mesh: its size in the unit that it has, is said or seems to have, and its bodies."""
     import numpy as np
 
     from paint_deposition.files.meshes import LARGEST_M, WITH_UNIT, read_bodies
 
-    ((vertices, faces), *_), scale, unit = read_bodies(path), 1.0, ''
-    if path.suffix.lower() not in WITH_UNIT:
+    ((vertices, faces), *_), scale = read_bodies(path, part.body), part.mesh_scale
+    unit = '' if scale == 1.0 else f'read with --mesh-scale {scale:g}'
+    if not unit and path.suffix.lower() not in WITH_UNIT:
         unit = 'it has no unit and is taken for metres'
         largest = float(np.ptp(vertices, axis=0).max()) if len(vertices) else 0.0
         if largest > LARGEST_M:
@@ -136,7 +165,7 @@ def _mesh_contents(path: Path) -> Contents:
                 f'it has no unit and looks like millimetres, else it would be {largest:.4g} m '
                 'large: give --mesh-scale 0.001'
             )  # fmt: skip
-    surface = pd.read_mesh(path, scale, LARGEST_M)
+    surface = pd.read_mesh(path, scale, LARGEST_M, body=part.body)
     box, where = _box(surface.vertices_m)
     area_m2 = float(surface.vertex_areas_m2.sum())
     figures = {
@@ -264,8 +293,11 @@ def _gun_on_part(
     max_pose_gap_s: float,
     output: Path | None,
     model_file: Path | None,
-) -> Contents:
-    """How the gun ran over a part, drawn if a picture is wanted; what is odd goes to stderr."""
+) -> tuple[Contents, pd.DepositionModel]:
+    """How the gun ran over a part, drawn if a picture is wanted; what is odd goes to stderr.
+
+    And the model that says where its spray goes.
+    """
     with Progress('inspect') as show:
         show('reading')
         recorded = pd.read_recording(path, **motion)
@@ -279,10 +311,8 @@ def _gun_on_part(
             write_geometry_picture(output, seen.surface, seen.path, seen.geometry, title)
     print_all('note', seen.notes)
     print_all('warning', [*seen.trajectory.warnings, *seen.geometry.warnings])
-    files = {'mesh': str(part.mesh), 'trajectory': str(path)}
     figures = seen.to_dict() | {
         'mesh_file': str(part.mesh), 'trajectory': str(path), 'picture': output,
-        'provenance': origin(model, files),
     }  # fmt: skip
     lines = [seen.geometry.sentence, seen.geometry.facet_sentence]
-    return figures, [*lines, *([f'  {output}'] if output else [])]
+    return (figures, [*lines, *([f'  {output}'] if output else [])]), model

@@ -110,7 +110,9 @@ def option_group(
             try:
                 return command(**{into: kind(**{n: given.pop(n) for n in names})}, **given)
             except PaintError as error:
-                said = re.sub(r'\w+', lambda word: called.get(word[0], word[0]), str(error))
+                # A whole word, and no part of a name of a file.
+                words = r'(?<![\w./-])\w+(?![\w/-]|\.\w)'
+                said = re.sub(words, lambda word: called.get(word[0], word[0]), str(error))
                 raise type(error)(said) from None
 
         return with_options(with_one)

@@ -93,6 +93,10 @@ def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
         raise refusal(
             f'{path}: is no text, such as a workbook or a bag; give a {kind} YAML in UTF-8'
         ) from None
+    except ValueError as error:  # a date that is none
+        raise refusal(
+            f'{path}: cannot be read as YAML ({error}); put such a value in quotes'
+        ) from None
     except YAMLError as error:
         mark, problem = getattr(error, 'problem_mark', None), ' '.join(str(error).split())
         if mark is not None:

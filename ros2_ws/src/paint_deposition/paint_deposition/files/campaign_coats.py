@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.motion_files import MotionSource
@@ -15,10 +15,7 @@ from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.eq1_pattern import MOST, listed
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import ONLY_BRUSH
-from paint_deposition.request import Number, Text, validate
-
-# A name or number, read as text.
-Name = Annotated[str, BeforeValidator(str)]
+from paint_deposition.request import Name, Number, Text, validate
 
 
 class _Gun(MotionSource):

@@ -11,7 +11,6 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.atomic import read_yaml
 from paint_deposition.files.campaign_coats import (
-    Name,
     PaintJob,
     dried,
     laid_coats,
@@ -29,7 +28,7 @@ from paint_deposition.film.statistics import require_band
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.part.surface import toward_the_guns
-from paint_deposition.request import Number, OnePart, Text, validate
+from paint_deposition.request import Name, Number, OnePart, Text, validate
 
 Quantity = Literal[
     'x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session', 'layer',

@@ -95,8 +95,7 @@ def read_points(path: str | Path, unit: str | None = None) -> dict[str, np.ndarr
 
     ``unit`` is 'm', 'mm' or 'cm' where the headings have none.
     """
-    given = Layout(unit={'position': LENGTHS[unit]} if unit else {})
-    points = MeasuringPoints.read(Path(path), given, None)
+    points = MeasuringPoints.read(Path(path), Layout(), None, LENGTHS[unit] if unit else None)
     return dict(zip(points.labels, points.positions_m, strict=True))
 
 
@@ -111,8 +110,13 @@ class MeasuringPoints:
     words: str
 
     @staticmethod
-    def read(path: Path, layout: Layout, surface: Surface | None) -> 'MeasuringPoints':
-        """Read a list: point label and x, y, z, or from_left, height."""
+    def read(
+        path: Path, layout: Layout, surface: Surface | None, default_m: float | None = None
+    ) -> 'MeasuringPoints':
+        """Read a list: point label and x, y, z, or from_left, height.
+
+        ``default_m`` is the unit of places whose headings have none [m].
+        """
         try:
             read = ReadingTable.read(path, False, Layout(unit=layout.unit))
         except ReadingsError:
@@ -121,6 +125,9 @@ class MeasuringPoints:
             if not (layout.decimal or layout.sheet):
                 raise
             read = ReadingTable.read(path, False, own)
+        columns = [k for axis in (*AXES, *ON_FACE) for k in read.at.get(axis, [])]
+        if default_m and not any(read.headings[k].unit for k in columns):
+            read.layout = replace(read.layout, unit={'position': default_m})
         positions, normals, place_words = _places(read, surface)
         labels = read.labels
         if labels is None:
@@ -241,18 +248,25 @@ def _counts_anew(readings: ReadingTable) -> str:
 def write_predictions(path: str | Path, readings: Readings, predicted_um: np.ndarray) -> None:
     """Write the columns of the readings' file and ``predicted_um`` (N,), whole or not at all.
 
-    A row with several readings is written once: they are at one place.
+    A row with several readings is written once: they are at one place. Layers side by side have a
+    column each, such as ``predicted_um base``. Numbers have a decimal point.
     """
     read = ReadingTable.read(Path(readings.source), True, Layout(), readings.point)
-    _, row, _, _ = read.films_um()
-    rows, first = np.unique(row, return_index=True)
+    _, row, layer, _ = read.films_um()
     names = [heading.text for heading in read.headings]
-    kept = [k for k, name in enumerate(names) if name != 'predicted_um']
-    columns = [read.texts(k) for k in kept]
-    lines = [[column[r] for column in columns] for r in rows]
-    for line, k in zip(lines, first, strict=True):
-        line.append(f'{predicted_um[k]:.4f}')
-    write_table(path, [[*(names[k] for k in kept), 'predicted_um'], *lines])
+    kept = [k for k, name in enumerate(names) if name.split(' ')[0] != 'predicted_um']
+    numeric = (*AXES, *ON_FACE, *NORMALS, 'sigma', 'thickness')
+    words = {k for quantity, at in read.at.items() if quantity not in numeric for k in at}
+    columns = [read.texts(k) if k in words else read.texts_with_points(k) for k in kept]
+    lines = {r: [column[r] for column in columns] for r in sorted({*row.tolist()})}
+    beside = list(dict.fromkeys(read.layers)) or ['']
+    for one in beside:
+        its = np.ones(len(row), dtype=bool) if one == '' else layer == one
+        predicted = dict(zip(row[its][::-1].tolist(), predicted_um[its][::-1], strict=True))
+        for r, line in lines.items():
+            line.append(f'{predicted[r]:.4f}' if r in predicted else '')
+    added = [f'predicted_um {one}'.strip() for one in beside]
+    write_table(path, [[*(names[k] for k in kept), *added], *lines.values()])
 
 
 def write_table(path: str | Path, lines: Iterable[Sequence[object]]) -> None:

@@ -13,13 +13,13 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.rapid.program import is_rapid, program_trajectory, read_program
-from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
+from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.recordings.messages import JOINT_TYPE
 from paint_deposition.files.recordings.pose_topics import lookups, read_frames
 from paint_deposition.files.tables.pose_columns import CONVENTIONS, ROTATION_WORDS
 from paint_deposition.files.tables.poses import is_pose_table, read_pose_table
-from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_frame, is_pose, moved
+from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.request import MotionOptions, validate
 
@@ -58,8 +58,10 @@ class MotionSource(MotionOptions):
     @field_validator('rotation')
     @classmethod
     def _is_rotation(cls, name: str | None) -> str | None:
-        known = name is None or name.lower() in ('rotvec', *CONVENTIONS)
-        if not (known or re.fullmatch(r'[xyz]{3}|[XYZ]{3}', name or '')):
+        if name is None or name.lower() in ('rotvec', *CONVENTIONS):
+            return name and name.lower()
+        # Two turns in a row about one axis are one, and no convention.
+        if not re.fullmatch(r'[xyz]{3}|[XYZ]{3}', name) or name[1] in (name[0], name[2]):
             raise ValueError(f'{name!r} is no convention; give {ROTATION_WORDS}')
         return name
 
@@ -102,7 +104,11 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     path = Path(path)
     if is_rapid(path):
         source.require_kind(path, 'a RAPID module')
-        recorded = program_trajectory(read_program(path, source.gun_signal, source.procedure))
+        program = read_program(path, source.gun_signal, source.procedure)
+        try:
+            recorded = program_trajectory(program)
+        except RecordingError as error:
+            raise RecordingError(f'{path}: {error}') from None
     elif is_pose_table(path):
         recorded = read_table(path, source)
     elif maker := OTHER_PROGRAMS.get(path.suffix.lower()):
@@ -130,7 +136,11 @@ def _turned(recorded: Trajectory, source: MotionSource) -> Trajectory:
         return recorded
     sign, axis = (-1.0 if source.tool_axis[0] == '-' else 1.0), 'xyz'.index(source.tool_axis[-1])
     turn, _ = Rotation.align_vectors([sign * np.eye(3)[axis]], [[0.0, 0.0, 1.0]])
-    turned = (Rotation.from_quat(recorded.quaternions_xyzw) * turn).as_quat()
+    # Of unchanged norm, by which damaged ones are known.
+    turned = recorded.quaternions_xyzw.copy()
+    norms = np.linalg.norm(turned, axis=1)
+    rows = (norms > 0.0) & np.isfinite(norms)
+    turned[rows] = norms[rows, np.newaxis] * (Rotation.from_quat(turned[rows]) * turn).as_quat()
     notes = (*recorded.notes, f'its tool sprays along {source.tool_axis}')
     return replace(recorded, quaternions_xyzw=turned, notes=notes)
 
@@ -168,6 +178,11 @@ def read_gun_motions(
             f'{len(files)} files for {len(guns)} atomizers: give one with all of them, or one for '
             'each'
         )
+    if len(guns) > len(files) and (is_rapid(files[0]) or is_pose_table(files[0])):
+        raise RecordingError(
+            f'{files[0]} is no bag and has the motion of one gun, not of {len(guns)} atomizers; '
+            'give a file for each'
+        )
     if guns and (source.pose_topic or source.state_topic):
         raise RecordingError(
             'an atomizer is given by its name and by topics: leave out --atomizer, or '
@@ -193,7 +208,7 @@ def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
         trigger = state.name if state else None
         return trajectory_of(bag, f'/{gun}{POSE_TOPIC}', trigger, *how)
     # The bag of a plan names its trigger itself.
-    planned = None if source.state_topic else custom_data(bag.path).get(TRIGGER)
+    planned = None if source.state_topic else bag.custom_data.get(TRIGGER)
     trigger = source.state_topic or planned
     recorded = trajectory_of(bag, source.pose_topic, trigger, *how)
     notes = (f'a plan: its trigger {planned} is used',) if planned else ()
@@ -230,7 +245,7 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
         of = f"'{named}'" if named else 'their own frame'
         note = f'part_pose: poses brought from {of} to the part, which stands at '
         note += words(Rigid.of(source.part_pose))
-        brought = moved(recorded, Rigid.of(source.part_pose).inverse(), part)
+        brought = at_part(recorded, source.part_pose, part)
         return replace(brought, notes=(*brought.notes, note))
     known = ''
     if bag is not None and (recorded.frames or not is_frame(named, part)):

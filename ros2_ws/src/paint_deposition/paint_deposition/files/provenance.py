@@ -113,7 +113,7 @@ def planned_model(motion: Path) -> tuple[Path, str] | None:
     """
     folder = motion if motion.is_dir() else motion.parent
     if not is_rapid(motion) and motion.suffix != '.csv':
-        digest = custom_data(folder).get(DIGEST, '')
+        digest = custom_data(motion).get(DIGEST, '')
         return (folder / MODEL_FILE, digest) if digest else None
     files, pattern = [motion], r'!.*\bmodel\b.*\bsha256 ([0-9a-f]{64})'
     if not is_rapid(motion):

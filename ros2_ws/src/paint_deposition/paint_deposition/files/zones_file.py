@@ -11,7 +11,7 @@ from paint_deposition.files.atomic import read_yaml
 from paint_deposition.files.meshes import read_triangles
 from paint_deposition.film.statistics import require_band
 from paint_deposition.part.zones import Box, Patch, Region, Zone, Zones
-from paint_deposition.request import Number, Text, validate
+from paint_deposition.request import Name, Number, Text, validate
 
 FACES = 'a list of numbers of triangles from 0, as 7, or of ranges, as 0-119'
 
@@ -30,7 +30,7 @@ def _number_range(written: Any) -> tuple[int, int]:
 class ZoneEntry(BaseModel, extra='forbid'):
     """A zone as it is written; paths are relative to its file."""
 
-    name: Annotated[str, BeforeValidator(str), Field(min_length=1, description='what to call it')]
+    name: Annotated[Name, Field(min_length=1, description='what to call it')]
     target_um: Number = Field(gt=0.0, description='the film wanted, above 0 [um]')
     tolerance_um: Number = Field(gt=0.0, description='what the film may differ, above 0 [um]')
     box: (
@@ -105,7 +105,12 @@ def _regions(
         mesh = folder / entry.mesh if entry.mesh else part
         of_mesh = entry.body or (None if entry.mesh else body)
         vertices_m, faces, rows, _ = read_triangles(mesh, entry.mesh_scale or scale, of_mesh)
-        if entry.faces:
+        if entry.faces and rows is None:
+            raise PaintError(
+                f'faces: {mesh} has several bodies, in no order of their own; name one with body, '
+                f'which numbers its triangles from 0 (paint inspect {mesh} lists them)'
+            )
+        if entry.faces and rows is not None:
             highest, most = int(rows[-1]), max(last for _, last in entry.faces)
             if most > highest:
                 raise PaintError(f'faces: {mesh} has no triangle {most}, its last is {highest}')

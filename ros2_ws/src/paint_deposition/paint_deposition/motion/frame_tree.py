@@ -13,7 +13,20 @@ from paint_deposition.motion.part_frame import Rigid
 # Where a frame was between two transforms that are further apart is not known. A live pose waits
 # as long for its transform, so that a recording has the same poses as the nodes had.
 LONGEST_GAP_NS = 2_000_000_000
+# A sample that is older than the newest by more is late; two in a row are of a restarted stream.
+# One without a stamp among those of a clock begins nothing; stamps from here on, of the year 2001,
+# are of a clock and not of a simulation that began at 0.
+FAR_BEHIND_NS, CLOCK_NS = 1_000_000_000, 1_000_000_000_000_000_000
 STAMP = itemgetter(0)
+
+
+def began_again(stamps_ns: np.ndarray) -> int | None:
+    """The row of samples, stamps (N,) as they came, in which a restarted stream is known."""
+    newest = np.maximum.accumulate(stamps_ns)
+    behind = stamps_ns < newest - FAR_BEHIND_NS
+    behind &= (stamps_ns > 0) | (newest < CLOCK_NS)
+    again = behind[:-1] & behind[1:] & (np.diff(stamps_ns) > 0)
+    return int(np.argmax(again)) if again.any() else None
 
 
 class NoTransform(Exception):
@@ -73,13 +86,8 @@ class FrameTree:
             return False
         name, newest_ns = _name(child), self.newest_ns(child)
         entry = stamp_ns, _name(parent), np.array(pose, dtype=float)
-        # A live transform that is older than the newest by more [ns] is late; two in a row are of
-        # a restarted stream.
-        is_behind = self._live and stamp_ns < newest_ns - 1_000_000_000
-        # One without a stamp among those of a clock begins nothing.
-        # Stamps from here on, of the year 2001, are of a clock and not of a simulation that began
-        # at 0.
-        is_behind &= stamp_ns > 0 or newest_ns < 1_000_000_000_000_000_000
+        is_behind = self._live and stamp_ns < newest_ns - FAR_BEHIND_NS
+        is_behind &= stamp_ns > 0 or newest_ns < CLOCK_NS
         before = self._behind.pop(name, None)
         restarted = False
         if is_behind and before is not None and before[0] < stamp_ns:

@@ -9,10 +9,8 @@ import numpy as np
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import DEFAULT_MAX_STEP_M, spray_path
+from paint_deposition.motion.stream_quality import MANY_REPEATED
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory, gap_ns
-
-# A recorder may repeat a stamp now and then; more than this share of the poses is a fault.
-MANY_REPEATED = 0.05
 
 
 def checked_path(

@@ -8,7 +8,7 @@ import numpy as np
 
 from paint_deposition.motion.trajectory import Trajectory
 
-# As for poses of a recording: further off is damage, not rounding.
+# RAPID writes quaternions with four digits; further off is damage, not rounding.
 QUATERNION_TOLERANCE = 0.01
 # On which painting nodes say where the part stands.
 PART_POSE_TOPIC = 'part_pose'

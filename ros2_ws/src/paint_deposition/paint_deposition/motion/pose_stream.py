@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from paint_deposition.motion.part_frame import QUATERNION_TOLERANCE
 from paint_deposition.motion.stream_quality import RepeatedSamples
 from paint_deposition.motion.trajectory import ONLY_BRUSH, PoseCounts, Trajectory
 
@@ -163,8 +164,6 @@ def _rows(kept: PoseBatch, start: int, stop: int) -> Iterator[PoseBatch]:
         yield kept.select(slice(row, min(row + BATCH_POSES, stop)))
 
 
-# RAPID writes quaternions with four digits; further off is damage, not rounding.
-QUATERNION_TOLERANCE = 0.01
 # A number beyond this is damage too, and its square must be one in single precision [m].
 FARTHEST_M = 1e6
 

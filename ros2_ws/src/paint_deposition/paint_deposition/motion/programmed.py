@@ -4,11 +4,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered
 
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
@@ -49,18 +51,22 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
     """Poses along moves, from the end of the first on, at the programmed speeds.
 
     Where the gun is not known from the moves it sprays throughout. Raises RecordingError without a
-    second move or a speed.
+    second move, and naming the line of one without a pose or a speed.
     """
     if len(moves) < 2:
         raise RecordingError('there is a single move; give a program that travels')
+    for move in moves:
+        if not is_pose(pose := [*map(float, move.position_m), *map(float, move.quaternion_xyzw)]):
+            words = ' '.join(f'{value:g}' for value in pose)
+            raise RecordingError(f'line {move.line}: {words} is no pose; give {POSE_FORMAT}')
     first = moves[0]
     times_s, positions, quaternions = [0.0], [first.position_m], [first.quaternion_xyzw]
     changes: list[tuple[float, float, int]] = []
     for before, move in pairwise(moves):
-        if not move.speed_m_per_s > 0.0:
+        if not 0.0 < move.speed_m_per_s < math.inf:
             raise RecordingError(f'line {move.line}: speed {move.speed_m_per_s:g} m/s; give one')
         turn = Rotation.from_quat([before.quaternion_xyzw, move.quaternion_xyzw])
-        length_m, place_at = _track(before.position_m, move)
+        length_m, place_at = track(before.position_m, move.via_m, move.position_m)
         angle_rad = (turn[0].inv() * turn[1]).magnitude()
         # What ABB's predefined speeds allow the tool to turn, for moves that only turn it.
         duration_s = max(
@@ -72,9 +78,13 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
                 f'line {move.line}: a move of {length_m:g} m at {move.speed_m_per_s:g} m/s takes '
                 f'{duration_s / 3600.0:.3g} h; check its target and speed'
             )
+        switches = [
+            (share, one.on, move.brush if one.brush is None else one.brush)
+            for share, one in in_order(move.switches, length_m)
+        ]
         changes += [
             (times_s[-1] + at * duration_s, on * move.flow, brush)
-            for at, on, brush in [(0.0, move.spraying, move.brush), *_switches(move, length_m)]
+            for at, on, brush in [(0.0, move.spraying, move.brush), *switches]
         ]
         count = math.ceil(duration_s / 0.02)  # a pose every 20 ms
         share = np.arange(1, count + 1) / max(count, 1)
@@ -93,24 +103,23 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
     )  # fmt: skip
 
 
-def _switches(move: Move, length_m: float) -> list[tuple[float, bool, int]]:
-    """Share of the move at which the gun is switched, whether on, and its brush, in order."""
-    at_m = [s.distance_m if s.from_start else length_m - s.distance_m for s in move.switches]
+def in_order(switches: Sequence[GunSwitch], length_m: float) -> list[tuple[float, GunSwitch]]:
+    """The switches of a move of this length as they happen, each with its share of the move."""
+    at_m = [one.distance_m if one.from_start else length_m - one.distance_m for one in switches]
     shares = [min(max(at / length_m, 0.0), 1.0) if length_m > 0.0 else 0.0 for at in at_m]
-    found = [
-        (share, switch.on, move.brush if switch.brush is None else switch.brush)
-        for share, switch in zip(shares, move.switches, strict=True)
-    ]
-    return sorted(found, key=lambda one: one[0])
+    return sorted(zip(shares, switches, strict=True), key=itemgetter(0))
 
 
-def _track(begin_m: np.ndarray, move: Move) -> tuple[float, Callable]:
+def track(
+    begin_m: np.ndarray, via_m: np.ndarray | None, end_m: np.ndarray
+) -> tuple[float, Callable]:
     """Length of a move [m], and a function from shares (N,) of it to places (N, 3) [m].
 
-    A circular move is straight where begin, middle and end lie on a line.
+    A circular move, which has a ``via_m`` (3,), is straight where that lies on a line with begin
+    and end.
     """
-    to_end = move.position_m - begin_m
-    to_via = np.zeros(3) if move.via_m is None else move.via_m - begin_m
+    to_end = end_m - begin_m
+    to_via = np.zeros(3) if via_m is None else via_m - begin_m
     normal = np.cross(to_via, to_end)
     square = normal @ normal
     if square <= 1e-12 * (to_via @ to_via) * (to_end @ to_end):

@@ -142,7 +142,7 @@ class RepeatedSamples:
 
 # Fewer samples a second blur the speed of the gun and cut its corners.
 LEAST_HZ = 10.0
-# A recorder may repeat a sample now and then; more than this share is a fault.
+# A recorder may repeat a sample or a stamp now and then; more than this share is a fault.
 MANY_REPEATED = 0.05
 # No part is further away: the unit is another one [m].
 FARTHEST_PART_M = 50.0

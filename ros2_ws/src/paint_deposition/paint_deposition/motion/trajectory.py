@@ -276,11 +276,11 @@ class Trajectory:
 
 DEFAULT_MAX_POSE_GAP_S = 0.25
 # A century [ns]: no longer gap is told from it, and sums of stamps and gaps fit 64 bits.
-LONGEST_GAP_NS = 3_155_760_000_000_000_000
+MOST_GAP_NS = 3_155_760_000_000_000_000
 
 
 def gap_ns(max_pose_gap_s: float) -> int:
     """The longest interval between poses that is no gap [ns], from seconds above 0."""
     if not (math.isfinite(max_pose_gap_s) and max_pose_gap_s > 0.0):
         raise RecordingError(f'max_pose_gap_s is {max_pose_gap_s}; give seconds above 0, 0.25 say')
-    return round(min(max_pose_gap_s * 1e9, LONGEST_GAP_NS))
+    return round(min(max_pose_gap_s * 1e9, MOST_GAP_NS))

@@ -10,7 +10,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.rapid.interpreter import Interpreter
 from paint_deposition.files.rapid.parser import Instruction, Module, Node, Routine
 from paint_deposition.model.eq1_pattern import MOST
-from paint_deposition.motion.programmed import GunSwitch, Move
+from paint_deposition.motion.programmed import GunSwitch, Move, in_order
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 OUTPUTS = ('setdo', 'set', 'reset', 'setao', 'setgo', 'pulsedo', 'invertdo')
@@ -65,7 +65,9 @@ class Gun(Interpreter):
         elif any(i.name.startswith('paint') for i in reached):
             signals = []
         elif len(signals) > 1:
-            raise RecordingError(f'{start.source} sets {words}; say which of them opens the gun')
+            raise RecordingError(
+                f'{start.source} sets {words}; give the one that opens the gun as gun_signal'
+            )
         self.program = RapidProgram(name, ''.join(signals))
         self.is_open, self.flow = False, 1.0
         self.brush: int | None = None  # None: no brush selected yet
@@ -182,7 +184,7 @@ class Gun(Interpreter):
             switches.append(GunSwitch(share * length_m, True, brush != 0, brush))
         return spray | {'switches': tuple(switches)}
 
-    def spray_in_move(self, triggers: Iterable[Any]) -> dict[str, Any]:
+    def spray_in_move(self, triggers: Iterable[Any], length_m: float) -> dict[str, Any]:
         """What the gun does in another move, with the values of its triggers."""
         given = [trigger for trigger in triggers if isinstance(trigger, tuple)]
         switches = [switch for what, switch in given if what == 'gun']
@@ -195,7 +197,7 @@ class Gun(Interpreter):
         later = tuple(switch for switch in switches if switch not in at_start)
         spray = self.spray | {'switches': later}
         if later:
-            self.is_open = later[-1].on
+            self.is_open = in_order(later, length_m)[-1][1].on
         return spray
 
 

@@ -140,7 +140,11 @@ class Interpreter(Values):
             raise _Return(self.value(i.values[0]) if i.values else None)
         elif i.name == 'exit':
             raise _Exit
-        elif i.name in CHANGING and i.values:
+        elif i.name in CHANGING:
+            needed = 2 if CHANGING[i.name] is None else 1
+            if len(i.values) != needed:
+                count = f'{needed} argument{"s" * (needed > 1)}'
+                self.fail(f'{i.name} takes {count}, not {len(i.values)}')
             step = CHANGING[i.name]
             added = self.number(i.values[1], i.name) if step is None else step
             before = 0.0 if i.name == 'clear' else self.number(i.values[0], i.name)

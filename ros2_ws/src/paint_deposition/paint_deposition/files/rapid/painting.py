@@ -18,6 +18,7 @@ from paint_deposition.files.rapid.values import (
     inverse,
     product,
 )
+from paint_deposition.motion.programmed import track
 
 # Instruction -> number of its targets; the last is where it ends.
 MOVES = {
@@ -26,6 +27,8 @@ MOVES = {
 }  # fmt: skip
 TRIGGER_OPTIONS = tuple(f't{number}' for number in range(2, 9))
 HOME = frame(NOWHERE)
+# A move from a place that is not known is longer than what its triggers count from its ends [m].
+FROM_UNKNOWN_M = 1e6
 
 
 class Painting(Gun):
@@ -126,15 +129,18 @@ class Painting(Gun):
         name, base = self._work_object(i)
         displaced = product(base, self._displacement)
         poses = [product(displaced, self._frame(target)) for target in targets]
+        via_m, length_m = poses[0][0] * 1e-3 if count == 2 else None, FROM_UNKNOWN_M
+        if self._at and self._at[0] == name:
+            length_m, _ = track(self._at[1][0] * 1e-3, via_m, poses[-1][0] * 1e-3)
         if i.name.startswith('paint'):
-            track = None
+            ends_mm = None
             if count == 1 and self._at and self._at[0] == name:
                 places = (product(inverse(base), end)[0] for end in (self._at[1], poses[-1]))
-                track = np.array([*places])
-            spray = self.spray_in_paint_move(track)
+                ends_mm = np.array([*places])
+            spray = self.spray_in_paint_move(ends_mm)
         else:
             named = [*between, *(at for name, at in i.options.items() if name in TRIGGER_OPTIONS)]
-            spray = self.spray_in_move([self.known(node) for node in named])
+            spray = self.spray_in_move([self.known(node) for node in named], length_m)
         at = name, poses[-1]
         position, rotation = at[1]
         held, its_tool = self.value(tool), name_of(tool)
@@ -144,9 +150,12 @@ class Painting(Gun):
             self.fail(f'tool {its_tool} stands still; only tools the robot holds are read')
         stop, radius_mm, *_ = self._record(self.known(zone), 'zonedata')
         zone_m = 0.0 if stop else self.number(radius_mm, 'the radius of the zone') * 1e-3
+        speed_m_per_s, duration_s = self._speed_m_per_s(i, speed), self._duration_s(i)
+        if duration_s and 0.0 < length_m < FROM_UNKNOWN_M:
+            speed_m_per_s = length_m / duration_s
         self.program.moves.append(RapidMove(
-            position * 1e-3, rotation.as_quat(), self._speed_m_per_s(i, speed, at),
-            via_m=poses[0][0] * 1e-3 if count == 2 else None, line=i.line, instruction=i.name,
+            position * 1e-3, rotation.as_quat(), speed_m_per_s, wait_s=duration_s,
+            via_m=via_m, line=i.line, instruction=i.name,
             zone_m=zone_m, tool=its_tool, frame=name,
             work_object=name_of(i.options.get('wobj')) or 'wobj0', **spray,
         ))  # fmt: skip
@@ -180,13 +189,18 @@ class Painting(Gun):
         )
         return unit, self._frame(own)
 
-    def _speed_m_per_s(self, i: Instruction, node: object, at: tuple[str, Frame]) -> float:
-        if 't' in i.options and self._at and self._at[0] == at[0]:
-            duration_s = self.number(i.options['t'], 'the duration')
-            if not duration_s > 0.0:
-                self.fail(f'a duration of {duration_s:g} s; give one above 0')
-            length_mm = float(np.linalg.norm(at[1][0] - self._at[1][0]))
-            return length_mm * 1e-3 / duration_s * self._speed_share
+    def _duration_s(self, i: Instruction) -> float:
+        """How long a move takes, 0 where its speed says so."""
+        if 't' not in i.options:
+            return 0.0
+        duration_s = self.number(i.options['t'], 'the duration')
+        if not duration_s > 0.0:
+            self.fail(f'a duration of {duration_s:g} s; give one above 0')
+        if not self._speed_share > 0.0:
+            self.fail(f'a speed of {self._speed_share:.0%} by VelSet; give one above 0')
+        return duration_s / self._speed_share
+
+    def _speed_m_per_s(self, i: Instruction, node: object) -> float:
         if 'v' in i.options:
             speed = self.number(i.options['v'], 'the speed')
         else:

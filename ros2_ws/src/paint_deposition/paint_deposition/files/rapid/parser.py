@@ -60,6 +60,7 @@ class Routine(NamedTuple):
     parameters: list[Parameter]
     body: Node
     source: str
+    is_procedure: bool
 
 
 class Module(NamedTuple):
@@ -130,10 +131,20 @@ class _Builder(Transformer):
         return [parameter for parameter in parameters if parameter]
 
     def routine(self, *parts: Any) -> Routine:
-        names = [str(part) for part in parts if isinstance(part, str)]
-        parameters = next((part for part in parts if isinstance(part, list)), [])
-        body = next(part for part in parts if isinstance(part, Node) and part.rule == 'block')
-        return Routine(names[-1], parameters, body, '')
+        return _routine(parts, True)
+
+    def function(self, *parts: Any) -> Routine:
+        return _routine(parts, False)
+
+    def trap(self, *parts: Any) -> Routine:
+        return _routine(parts, False)
+
+
+def _routine(parts: tuple[Any, ...], is_procedure: bool) -> Routine:
+    names = [str(part) for part in parts if isinstance(part, str)]
+    parameters = next((part for part in parts if isinstance(part, list)), [])
+    body = next(part for part in parts if isinstance(part, Node) and part.rule == 'block')
+    return Routine(names[-1], parameters, body, '', is_procedure)
 
 
 def line_of(token: Token) -> int:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.errors import PlanError, RecordingError, quoted
 from paint_deposition.files.atomic import MOST_TEXT_MB, filled, read_file
 from paint_deposition.files.rapid.gun import RapidProgram
 from paint_deposition.files.rapid.painting import Painting
@@ -42,9 +42,13 @@ def read_program(
         files = sorted(file for file in path.iterdir() if file.suffix.lower() in MODULES)
     elif path.suffix.lower() == LIST_OF_MODULES:
         names = re.findall(r'<Module>\s*(.*?)\s*</Module>', _text(path), re.IGNORECASE)
-        files = [path.with_name(name) for name in names]
-        if not files:
+        if not names:
             raise RecordingError(f'{path} lists no modules; give the folder of the modules')
+        if odd := [name for name in names if not name or name != Path(name).name]:
+            raise RecordingError(
+                f'{path} lists the module {quoted(odd[0])}; name modules that lie beside it'
+            )
+        files = [path.with_name(name) for name in names]
     try:
         modules = [m for file in files for m in parse_modules(_text(file), str(file))]
         start = _start(modules, procedure, path)
@@ -69,7 +73,10 @@ def is_rapid(path: Path | str) -> bool:
 def _text(file: Path) -> str:
     try:
         content = read_file(file, RecordingError, MOST_TEXT_MB)
-        return content.decode('utf-8', errors='replace')
+        try:
+            return content.decode('utf-8')
+        except UnicodeDecodeError:  # as older controllers write modules; any bytes are such a text
+            return content.decode('latin-1')
     except OSError as error:
         raise RecordingError(f'cannot read {file}: {error.strerror}') from None
 
@@ -78,7 +85,7 @@ def _start(modules: list[Module], procedure: str | None, path: Path) -> Routine:
     routines = {
         item.name: item
         for module in modules for item in (*module.shared, *module.local)
-        if isinstance(item, Routine)
+        if isinstance(item, Routine) and item.is_procedure
     }  # fmt: skip
     only = next(iter(routines)) if len(routines) == 1 else 'main'
     start = procedure.lower() if procedure else only

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError, quoted
 from paint_deposition.files.rapid.parser import Datum, Module, Node, Routine
+from paint_deposition.motion.part_frame import QUATERNION_TOLERANCE
 
 # Of one array, and of all lists that are made or copied while a program runs.
 MOST_ELEMENTS, MOST_COPIED = 1_000_000, 10_000_000
@@ -63,8 +64,7 @@ def frame(pose: Any) -> Frame:
             f'{quoted(pose)} is no position [x, y, z] with a quaternion [q1, q2, q3, q4]'
         )
     norm = math.hypot(*quaternion)
-    # Quaternions are written with four digits; further off is damage, not rounding.
-    if abs(norm - 1.0) > 0.01:
+    if abs(norm - 1.0) > QUATERNION_TOLERANCE:
         raise ValueError(f'quaternion {quaternion} has the norm {norm:.4f} instead of 1')
     return np.array(position), Rotation.from_quat([*quaternion[1:], quaternion[0]])
 

@@ -68,6 +68,7 @@ class Bag:
     """An open bag; made by `open_bag`.
 
     Attributes:
+        custom_data: see the function of that name.
         warnings: what it lacks.
         skipped: how many messages are left out as the nodes leave them out, by what they are.
     """
@@ -80,14 +81,14 @@ class Bag:
         counts: Counter[tuple[str, str]] = Counter()
         for connection in reader.connections:
             counts[connection.topic, connection.msgtype] += connection.msgcount
-        folder = path if path.is_dir() else path.parent
-        kept = custom_data(folder).get(KEPT, '').split()
-        named = _information(folder).get('relative_file_paths') or []
+        self.custom_data = custom_data(path)
+        kept = self.custom_data.get(KEPT, '').split()
+        named = _named_files(_information(path))
         self.warnings: tuple[str, ...] = ()
         self.skipped: Counter[str] = Counter()
         if path.name in named[:-1] or path.name in named[1:]:
             several = f'{path.name} is one of the {len(named)} files of a split bag'
-            self.warnings = (f'{several}; give its folder, {folder}, for all of it',)
+            self.warnings = (f'{several}; give its folder, {path.parent}, for all of it',)
         self._kept = {name: int(n) for name, _, n in (entry.partition('=') for entry in kept)}
         # Sorted by name, topics without messages included.
         self.topics = [
@@ -153,7 +154,7 @@ class Bag:
             connection = next(c for c in self._reader.connections if c.topic == topic)
             store = get_typestore(definitions.STANDARD_STORE if self._is_ros1 else Stores.EMPTY)
             form, text = connection.msgdef
-            standard = get_typestore(definitions.STANDARD_STORE).fielddefs
+            standard = definitions.own_types().fielddefs
             if form == MessageDefinitionFormat.IDL:
                 types = get_types_from_idl(text)
             elif form == MessageDefinitionFormat.MSG:
@@ -238,26 +239,40 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
         reader = Ros1Reader(path) if path.suffix == '.bag' else Ros2Reader(path)
         reader.open()
     try:
-        yield Bag(path, reader)
+        with _read_errors(path):
+            bag = Bag(path, reader)
+        yield bag
     finally:
         reader.close()
 
 
 def custom_data(path: Path) -> dict[str, str]:
-    """The custom data in the metadata.yaml of a rosbag2 folder, by name."""
+    """The custom data in the metadata.yaml of a rosbag2 folder, or of one of its files."""
     told = _information(path).get('custom_data')
     return {str(key): str(value) for key, value in told.items()} if isinstance(told, dict) else {}
 
 
 def _information(path: Path) -> dict[str, Any]:
-    """What the metadata.yaml of a rosbag2 folder says, nothing where it cannot be read."""
+    """What the metadata.yaml of a rosbag2 folder says, or beside a file one that names it.
+
+    Nothing where it cannot be read.
+    """
+    folder = path if path.is_dir() else path.parent
     try:
-        text = read_file(path / 'metadata.yaml', RecordingError, MOST_TEXT_MB).decode('utf-8')
+        text = read_file(folder / 'metadata.yaml', RecordingError, MOST_TEXT_MB).decode('utf-8')
         require_small(text)
         metadata = yaml.load(text, Loader=getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
-        return dict(metadata['rosbag2_bagfile_information'])
+        told = dict(metadata['rosbag2_bagfile_information'])
     except Exception:  # damaged, or no bag, which reading it reports
         return {}
+    return told if path.is_dir() or path.name in _named_files(told) else {}
+
+
+def _named_files(information: dict[str, Any]) -> list[str]:
+    """The names of the files of a bag, in order, as they are when they are expanded."""
+    listed = information.get('relative_file_paths')
+    named = listed if isinstance(listed, list) else []
+    return [Path(str(name)).name.removesuffix('.zstd') for name in named]
 
 
 def mcap_files(path: Path) -> list[Path]:
@@ -304,9 +319,9 @@ def _require_bag(path: Path) -> None:
     if path.is_dir() and not (path / 'metadata.yaml').is_file():
         unfinished = unfinished or 'it has no metadata.yaml'
     # A recorder that splits its bag and is killed has not named the last file yet.
-    listed = _information(path).get('relative_file_paths')
-    listed = listed if isinstance(listed, list) else [*stored]
-    others = stored - {Path(str(name)).name.removesuffix('.zstd') for name in listed}
+    told = _information(path)
+    known = isinstance(told.get('relative_file_paths'), list)
+    others = stored - {*_named_files(told)} if known else set()
     if path.is_dir() and others:
         named = ', '.join(sorted(others))
         unfinished = unfinished or f'its metadata.yaml does not name {named}'

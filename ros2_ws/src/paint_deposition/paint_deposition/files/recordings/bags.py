@@ -16,7 +16,7 @@ from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings import messages as definitions
-from paint_deposition.files.recordings.bag_files import Bag, BagTopic, custom_data
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, Signal, stamp_ns
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses, read_tf_poses
@@ -134,7 +134,8 @@ def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarr
     """
     signal, settings = Signal.parse(name), dict[str, float]()
     topic = bag.find(signal.topic) if signal else None
-    if signal is None or topic is None or topic.type in (STATE_TYPE, BOOL_TYPE):
+    is_state = topic is not None and topic.type in (STATE_TYPE, BOOL_TYPE)
+    if signal is None or topic is None or (is_state and signal == Signal(signal.topic, '')):
         topic = choose_state_topic(bag, name)
         by_log_time = topic.type == BOOL_TYPE
         changes, settings, notes = _changes_of_states(bag, topic)
@@ -149,7 +150,7 @@ def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarr
     rows: np.ndarray = np.empty(0, np.int64)
     # Where the clock was set back, the order in which they came says of which stream they are; in
     # the run of a part it says so as it did to the simulator.
-    if 'serial' in custom_data(bag.path) or np.any(np.diff(motion.stamps_ns) < 0):
+    if 'serial' in bag.custom_data or np.any(np.diff(motion.stamps_ns) < 0):
         logged = np.array([change[3] for change in changes], np.int64)
         rows = np.searchsorted(np.maximum.accumulate(log_times_ns), logged)
     else:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,10 +13,11 @@ import networkx as nx
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.errors import RecordingError, did_you_mean
+from paint_deposition.errors import RecordingError, did_you_mean, quoted
 from paint_deposition.files.atomic import MOST_TEXT_MB, read_file
 from paint_deposition.files.recordings.bag_files import Bag, listed_topics
-from paint_deposition.files.recordings.messages import JOINT_TYPE, stamp_ns
+from paint_deposition.files.recordings.messages import JOINT_TYPE, joint_streams
+from paint_deposition.files.recordings.pose_topics import starts_again
 from paint_deposition.files.tables.headings import ANGLES, LENGTHS
 from paint_deposition.motion.arm import Arm
 from paint_deposition.motion.stream_quality import RepeatedSamples, StreamQuality
@@ -31,7 +33,8 @@ T = TypeVar('T')
 class Robot:
     """The kinematic chain from a robot's base link to its tip link, joints of pytransform3d.
 
-    A recording may have ``joint_prefix`` before the names of the joints, or lack it, and have
+    ``fastest`` are the speeds of those that move [rad/s or m/s], infinite where none is said. A
+    recording may have ``joint_prefix`` before the names of the joints, or lack it, and have
     angles and lengths in other units than rad and m, where it does not say them itself.
     """
 
@@ -39,6 +42,7 @@ class Robot:
     base: str
     tip: str
     chain: list[Any]
+    fastest: Mapping[str, float]
     joint_prefix: str = ''
     angle_unit: str | None = None
     length_unit: str | None = None
@@ -62,6 +66,10 @@ class Robot:
             raise RecordingError(f'{path} is xacro; run: xacro {path} > robot.urdf')
         try:
             _, links, joints = parse_urdf(text)
+            limits = {
+                joint.get('name', ''): joint.find('limit')
+                for joint in ElementTree.fromstring(text).iter('joint')
+            }
         except Exception as error:  # whatever the XML provokes in the parser
             raise RecordingError(f'{path} is no URDF ({" ".join(str(error).split())})') from None
         parents = nx.DiGraph([(joint.child, joint.parent, {'joint': joint}) for joint in joints])
@@ -78,7 +86,27 @@ class Robot:
         if tip == base or not nx.has_path(parents, tip, base):
             raise RecordingError(f"{path}: link '{tip}' does not hang on '{base}'; give base_link")
         way = nx.utils.pairwise(nx.shortest_path(parents, tip, base))
-        return Robot(path, base, tip, [parents.edges[pair]['joint'] for pair in way][::-1])
+        chain = [parents.edges[pair]['joint'] for pair in way][::-1]
+        fastest = {}
+        for joint in (joint for joint in chain if joint.joint_type != 'fixed'):
+            name, limit = joint.joint_name, limits.get(joint.joint_name)
+            if not 0.0 < np.linalg.norm(joint.joint_axis) < np.inf:
+                axis = ' '.join(f'{value:g}' for value in joint.joint_axis)
+                raise RecordingError(f"{path}: the axis of joint '{name}' is {axis}; give one")
+            said, speed = '0' if limit is None else limit.get('velocity', '0'), np.nan
+            with suppress(ValueError):
+                speed = float(said)
+            if not speed >= 0.0:
+                raise RecordingError(
+                    f"{path}: the velocity of joint '{name}' is {quoted(said)}; give a number of "
+                    '0 or more'
+                )
+            fastest[name] = speed or np.inf
+        if not fastest:
+            raise RecordingError(
+                f"{path}: no joint between '{base}' and '{tip}' moves; give base_link and tip_link"
+            )
+        return Robot(path, base, tip, chain, fastest)
 
     @property
     def moving_joints(self) -> list[str]:
@@ -97,14 +125,11 @@ class Robot:
                 frame = np.eye(4)
         axes = np.array([joint.joint_axis for joint in moving])
         lower, upper = np.array([joint.limits for joint in moving]).T
-        root = ElementTree.parse(self.path).getroot()
-        limits = {joint.get('name', ''): joint.find('limit') for joint in root.iter('joint')}
-        fastest = {n: float(e.get('velocity', 0)) for n, e in limits.items() if e is not None}
         return Arm(
             tuple(self.moving_joints), np.array([*frames, frame]),
             axes / np.linalg.norm(axes, axis=1, keepdims=True),
             np.array([joint.joint_type == 'prismatic' for joint in moving]), lower, upper,
-            np.array([max(fastest.get(name, 0.0), 0.0) or np.inf for name in self.moving_joints]),
+            np.array([*self.fastest.values()]),
         )  # fmt: skip
 
     def recorded_joints(
@@ -195,8 +220,8 @@ def read_joint_poses(
     """The motion of a robot's tip from joint states, their log times (N,) [ns] and topics.
 
     Joints in separate messages, as those of a rail, are interpolated at the times of the most
-    frequent one. Raises RecordingError without joint states of all joints, or with a joint on
-    several topics of which none is named.
+    frequent one. Raises RecordingError without joint states of all joints at one time, with a
+    joint on several topics of which none is named, or if the stream starts again.
     """
     named = (topic_names or '').split()
     topics = [bag.choose(name, (JOINT_TYPE,), 'JointState').name for name in named]
@@ -204,12 +229,7 @@ def read_joint_poses(
     if not topics:
         listed = listed_topics([], 'JointState')
         raise RecordingError(f'{bag.path}: name a topic of joint states; {listed}')
-    # Of each topic and set of joints: stamps, log times and values.
-    streams: dict[tuple[str, tuple[str, ...]], list[tuple[int, int, list[float]]]] = {}
-    for topic, log_time_ns, message in bag.decoded(topics):
-        rows = streams.setdefault((topic, tuple(message.name)), [])
-        if len(message.position) == len(message.name):
-            rows.append((stamp_ns(message.header), log_time_ns, list(message.position)))
+    streams, without = joint_streams(bag.decoded(topics))
     on_all, all_joints = ' and '.join(topics), {n: n for _, names in streams for n in names}
     recorded = robot.recorded_joints(all_joints, f'{on_all} in {bag.path}')
     for joint, name in recorded.items():
@@ -221,25 +241,36 @@ def read_joint_poses(
             )
     columns: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
     warnings: list[str] = []
-    used: list[str] = []
+    used: dict[str, tuple[str, tuple[str, ...]]] = {}
     for (topic, names), rows in streams.items():
         wanted = [column for column, name in enumerate(names) if name in recorded.values()]
-        if not (wanted and rows):
+        if not wanted:
             continue
-        used.append(topic)
+        what = f'joint states on {topic}'
+        bag.skipped[f'{what} without a position for each joint'] += without[topic, names]
+        if not rows:
+            continue
         stamps, logged = np.array([row[:2] for row in rows], np.int64).T
         values = np.array([row[2] for row in rows], dtype=float)
+        if fault := starts_again(stamps, logged):
+            raise RecordingError(f'{topic} in {bag.path}: {fault}')
         warnings += StreamQuality.of(stamps, values).repeats(topic)
         new = RepeatedSamples().are_new(stamps, values)
-        new[new] = np.diff(np.maximum.accumulate(stamps[new]), prepend=-1) > 0
+        later = np.diff(np.maximum.accumulate(stamps[new]), prepend=-1) > 0
+        bag.skipped[f'{what} stamped no later than one before'] += np.count_nonzero(~later)
+        new[new] = later
         stamps, logged, values = stamps[new], logged[new], values[new]
         finite = np.isfinite(values[:, wanted]).all(axis=1)
-        if not finite.all():
-            what = f'joint states on {topic} with joints that are not finite'
-            bag.skipped[what] += int(np.count_nonzero(~finite))
+        bag.skipped[f'{what} with joints that are not finite'] += np.count_nonzero(~finite)
         for column in wanted:
             if np.count_nonzero(finite) > len(columns.get(names[column], ([],))[0]):
                 columns[names[column]] = stamps[finite], logged[finite], values[finite, column]
+                used[names[column]] = topic, names
+    for topic, names in streams:
+        if (topic, names) not in used.values() and not used.keys().isdisjoint(names):
+            what = f'joint states on {topic} with another set of joints than most'
+            bag.skipped[what] += len(streams[topic, names])
+    bag.skipped = +bag.skipped
     short = [joint for joint, name in recorded.items() if len(columns.get(name, ([],))[0]) < 2]
     if short:
         raise RecordingError(
@@ -249,11 +280,19 @@ def read_joint_poses(
     clock, logged, _ = max(columns.values(), key=lambda column: len(column[0]))
     begin = max(at[0] for at, _, _ in columns.values())
     known = (clock >= begin) & (clock <= min(at[-1] for at, _, _ in columns.values()))
+    if np.count_nonzero(known) < 2:
+        ends = min(columns, key=lambda name: columns[name][0][-1])
+        begins = max(columns, key=lambda name: columns[name][0][0])
+        raise RecordingError(
+            f'{bag.path}: its joints are not recorded at the same time: {ends} on '
+            f'{used[ends][0]} until {1e-9 * columns[ends][0][-1]:.3f} s, {begins} on '
+            f'{used[begins][0]} from {1e-9 * begin:.3f} s on; record all joints together'
+        )
     each = [columns[recorded[joint]] for joint in robot.moving_joints]
     values = np.stack(
         [np.interp(clock[known] - begin, at - begin, v) for at, _, v in each], axis=1
     )
-    on_used = ' and '.join(dict.fromkeys(used))
+    on_used = ' and '.join(sorted({topic for topic, _ in used.values()}))
     si = robot.in_si(values, f'{on_used} in {bag.path}')
     trajectory = robot.trajectory(clock[known], si, recorded, on_used)
     return replace(trajectory, warnings=tuple(warnings)), logged[known], on_used

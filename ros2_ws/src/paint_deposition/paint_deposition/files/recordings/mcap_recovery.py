@@ -24,7 +24,7 @@ from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.metadata import parse_qos
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.atomic import require_file
+from paint_deposition.files.atomic import require_file, require_small
 from paint_deposition.files.recordings.bag_files import MOST_CHUNK_BYTES, expanded, mcap_files
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.messages import Definition
@@ -110,8 +110,10 @@ def _copy(
             schemas[record.id] = record
         elif isinstance(record, Metadata) and record.name == 'rosbag2':
             # An older record, or none, has to do where this one is damaged.
-            with suppress(yaml.YAMLError, AttributeError):
-                content = yaml.safe_load(record.metadata.get('serialized_metadata', ''))
+            with suppress(Exception):
+                text = record.metadata.get('serialized_metadata', '')
+                require_small(text)
+                content = yaml.safe_load(text)
                 custom = content.get('custom_data') or {}
                 writer.custom_data = {key: str(value) for key, value in custom.items()}
                 writer.ros_distro = content.get('ros_distro') or writer.ros_distro

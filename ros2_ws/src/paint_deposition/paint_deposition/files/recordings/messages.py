@@ -3,7 +3,8 @@
 import functools
 import json
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -99,18 +100,42 @@ def standard(message_type: str) -> Definition:
 
 def _share_file(message_type: str, suffix: str) -> Path:
     # ROS is imported where it is used: reading and writing bags must work without it.
-    from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
-
     try:
+        from ament_index_python.packages import get_package_share_directory
+
         package, kind, name = message_type.split('/')
         path = Path(get_package_share_directory(package)) / kind / f'{name}{suffix}'
-    except (ValueError, PackageNotFoundError):
+    except (ValueError, ModuleNotFoundError, LookupError):  # without ROS, or without the package
         raise RecordingError(
             f'{message_type} is not installed; source the workspace that defines it'
         ) from None
     if not path.is_file():
         raise RecordingError(f'{message_type} is not installed: {path} is missing')
     return path
+
+
+# Of each topic and set of joints: stamps, log times [ns] and values, in the order of the names.
+JointStreams = dict[tuple[str, tuple[str, ...]], list[tuple[int, int, list[float]]]]
+
+
+def joint_streams(decoded: Iterable[tuple[str, int, Any]]) -> tuple[JointStreams, Counter]:
+    """The streams in messages of JointState, given as topic, log time and message.
+
+    A set of joints is one in whatever order the messages name them. Messages without a position
+    for each joint are counted by topic and set.
+    """
+    streams: JointStreams = {}
+    without: Counter[tuple[str, tuple[str, ...]]] = Counter()
+    for topic, log_time_ns, message in decoded:
+        order = sorted(range(len(message.name)), key=message.name.__getitem__)
+        key = topic, tuple(message.name[k] for k in order)
+        rows = streams.setdefault(key, [])
+        if len(message.position) == len(order):
+            values = [float(message.position[k]) for k in order]
+            rows.append((stamp_ns(message.header), log_time_ns, values))
+        else:
+            without[key] += 1
+    return streams, without
 
 
 PLACED = ('translation', 'rotation')

@@ -15,11 +15,12 @@ from paint_deposition.files.recordings.bag_files import Bag, BagTopic, listed_to
 from paint_deposition.files.recordings.messages import (
     JOINT_TYPE,
     TF_TYPES,
+    joint_streams,
     pose_of,
     stamp_ns,
     transforms_of,
 )
-from paint_deposition.motion.frame_tree import FrameTree, NoTransform
+from paint_deposition.motion.frame_tree import FrameTree, NoTransform, began_again
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
 from paint_deposition.motion.trajectory import Trajectory
@@ -30,13 +31,29 @@ PART_POSE_TYPE = 'geometry_msgs/msg/TransformStamped'
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """Poses of a frame in its parent: (N,) stamps, (N,) log times, (N, 7) x y z qx qy qz qw."""
+    """Poses of a frame in its parent: (N,) stamps, (N,) log times, (N, 7) x y z qx qy qz qw.
+
+    ``fault`` says where a stream over time starts again, '' where it does not.
+    """
 
     parent: str
     child: str
     stamps_ns: np.ndarray
     log_times_ns: np.ndarray
     poses: np.ndarray
+    fault: str = ''
+
+
+def starts_again(stamps_ns: np.ndarray, log_times_ns: np.ndarray) -> str:
+    """In words where samples, (N,) as they came, start again; '' where they do not.
+
+    Which come before which is not known then: a clock was set back, or a log was looped.
+    """
+    row = began_again(stamps_ns)
+    if row is None:
+        return ''
+    after_s = 1e-9 * float(log_times_ns[row] - log_times_ns[0])
+    return f'the stamps start again {after_s:.3f} s after its first message; cut the bag there'
 
 
 def part_pose_topics(bag: Bag) -> list[str]:
@@ -70,7 +87,8 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
         stamps, log_times, values = map(np.array, zip(*its[last], strict=True))
         _, first = np.unique(stamps, return_index=True)  # in order, each stamp once
         values = values[first].astype(float)
-        edges.append(Edge(parent, child, stamps[first], log_times[first], values))
+        fault = '' if static else starts_again(stamps, log_times)
+        edges.append(Edge(parent, child, stamps[first], log_times[first], values, fault))
     return edges
 
 
@@ -103,7 +121,7 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
 
     It covers the time in which all transforms of the chain are known, with the stamps of the most
     frequent one; others are interpolated. Raises RecordingError for frames that are missing, not
-    connected, or do not move.
+    connected, do not move, or start again.
     """
     target, source = target.lstrip('/'), source.lstrip('/')
     tree = read_frames(bag)
@@ -115,6 +133,9 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
     if between is None:
         raise RecordingError(f"{bag.path}: no transforms lead from '{source}' to '{target}'")
     edges = [edge for edge in _edges(bag, static=False) if edge.child in between]
+    for edge in edges:
+        if edge.fault:
+            raise RecordingError(f'{bag.path}: {edge.parent} to {edge.child}: {edge.fault}')
     moving = [edge for edge in edges if len(edge.stamps_ns) > 1]
     if not moving:
         raise RecordingError(f"{bag.path}: '{source}' does not move in '{target}'")
@@ -161,6 +182,7 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
     kind = 'pose' if {topic.type for topic in pose_topics(bag)} - {POSE_TYPE} else 'PoseStamped'
     if not name:
         candidates = bag.topics_of(POSE_TYPE) or pose_topics(bag)
+        candidates = [topic for topic in candidates if topic.message_count] or candidates
         if len(candidates) != 1:
             listed = listed_topics(candidates, kind)
             moves = ['transforms (give tf: TARGET SOURCE)'] if bag.topics_of(*TF_TYPES) else []
@@ -276,15 +298,14 @@ def sources_of_poses(bag: Bag, max_gap_s: float) -> Iterator[PoseSource]:
         options = f'--pose-topic {topic.name}'
         yield _of_poses(topic.name, topic.type, poses.frame_id, values, quality, options)
     for topic in bag.topics_of(JOINT_TYPE):
-        rows: dict[tuple[str, ...], list[tuple[int, int, list[float]]]] = {}
-        for _, log_time_ns, message in bag.decoded([topic.name]):
-            row = stamp_ns(message.header), log_time_ns, list(message.position)
-            if len(row[2]) == len(message.name):
-                rows.setdefault(tuple(message.name), []).append(row)
+        streams, _ = joint_streams(bag.decoded([topic.name]))
+        rows = max(streams.values(), key=len, default=[])
         if rows:  # the joints that most messages have
-            columns = zip(*max(rows.values(), key=len), strict=True)
-            stamps, logged, joints = map(np.array, columns)
-            quality = StreamQuality.of(stamps, joints.astype(float), logged, max_gap_s)
+            stamps, logged, joints = map(np.array, zip(*rows, strict=True))
+            if fault := starts_again(stamps, logged):
+                yield PoseSource(topic.name, topic.type, faults=(fault,))
+                continue
+            quality = StreamQuality.of(stamps, joints, logged, max_gap_s)
             # Joints of a robot that is not known do not turn further [rad].
             degrees = np.nanmax(np.abs(joints), initial=0.0) > 4.0 * np.pi
             options = f'--urdf ROBOT --pose-topic {topic.name}'
@@ -294,8 +315,11 @@ def sources_of_poses(bag: Bag, max_gap_s: float) -> Iterator[PoseSource]:
     for edge in _edges(bag, static=False):
         if len(edge.stamps_ns) < 2:
             continue
-        quality = StreamQuality.of(edge.stamps_ns, edge.poses, edge.log_times_ns, max_gap_s)
         name, options = f'{edge.parent} to {edge.child}', f'--tf {edge.parent} {edge.child}'
+        if edge.fault:
+            yield PoseSource(name, 'transforms', edge.parent, faults=(edge.fault,))
+            continue
+        quality = StreamQuality.of(edge.stamps_ns, edge.poses, edge.log_times_ns, max_gap_s)
         yield _of_poses(name, 'transforms', edge.parent, edge.poses, quality, options)
 
 

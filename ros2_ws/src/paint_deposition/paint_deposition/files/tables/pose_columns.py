@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 POSITION = ('x', 'y', 'z')
 QUATERNION = ('qx', 'qy', 'qz', 'qw')
+SCALAR_FIRST = ('q2', 'q3', 'q4', 'q1')  # of ABB, in the order of the others
 ROTATION_VECTOR, ROLL_PITCH_YAW = ('rx', 'ry', 'rz'), ('roll', 'pitch', 'yaw')
 # What stands before an axis in the columns of an orientation, and what it makes of it.
 ROTATED = {
@@ -61,7 +62,7 @@ class PoseTable(Table):
         sheet, header = find_table(path, RecordingError, known, several=alone)
         if header is None:
             first = ', '.join(map(text_of, sheet.rows[0])) if sheet.rows else 'none'
-            if robot is not None:
+            if robot is not None and sheet.rows:
                 robot.recorded_joints(_by_text(headings_in(sheet.rows[0])), str(path), True)
             raise RecordingError(
                 f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first}); '
@@ -138,7 +139,7 @@ class PoseTable(Table):
                 f'{written} spans {span_s:.3g} s; write its unit in the heading, as in time [ms]'
             )
         try:
-            cells = [text.replace(',', '.') for text in self.texts(column)]
+            cells = [text.replace(',', '.').replace('−', '-') for text in self.texts(column)]
             stamps = [round(Decimal(cell) * round(scale * 1e9)) for cell in cells]
         except InvalidOperation:
             raise RecordingError(f'{written} has a word for a number; give numbers') from None
@@ -216,8 +217,7 @@ def read_rotations(
     one that can be read in two ways.
     """
     if rotation is None:
-        # ABB has the scalar first, q1.
-        for names in (QUATERNION, ('q2', 'q3', 'q4', 'q1')):
+        for names in (QUATERNION, SCALAR_FIRST):
             if columns := table.find_all(names):
                 order = 'scalar last' if names == QUATERNION else 'q1 the scalar'
                 note = f'quaternion {table.written(columns)} ({order})'
@@ -238,7 +238,7 @@ def read_rotations(
         )
     if convention == 'rotvec':
         return Rotation.from_rotvec(angles).as_quat(), f'rotation vector {written} in {unit}'
-    sequence = CONVENTIONS.get(convention.lower(), convention)
+    sequence = CONVENTIONS.get(convention, convention)
     if by_axis and len(set(sequence.lower())) == 3:
         angles = angles[:, ['xyz'.index(letter) for letter in sequence.lower()]]
     axes = "the tool's axes" if sequence.isupper() else 'fixed axes'

@@ -1,5 +1,6 @@
 """A table of poses as a trajectory: timed poses, or programmed passes with their speeds."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from paint_deposition.files.tables.pose_columns import (
     QUATERNION,
     ROLL_PITCH_YAW,
     ROTATION_VECTOR,
+    SCALAR_FIRST,
     PoseTable,
     column_name,
     read_rotations,
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
 
 SUFFIXES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods')
-# Names of columns, as `column_name` leaves them. The letter t is also an angle of Kawasaki's.
+# Names of columns, as `column_name` leaves them.
 TIME = ('time', 'timestamp', 'stamp', 'timefromstart', 'elapsed', 'zeit', 't')
 TRIGGER = ('spraying', 'trigger', 'gun', 'gunon', 'on', 'spray', 'sprayon', 'paint', 'painton')
 FLOW = ('flow', 'relativeflow')
@@ -42,11 +44,21 @@ def is_pose_table(path: Path) -> bool:
 
 
 def may_hold_poses(path: Path) -> bool:
-    """Whether a table has a column of times, speeds or angles, as no table of readings has."""
+    """Whether a table has a column of times, speeds or angles, as few tables of readings have."""
     names = {*TIME, *SPEED, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW}
+    return _has(path, lambda columns: len(columns & names))
+
+
+def holds_quaternions(path: Path) -> bool:
+    """Whether a table has the columns of a quaternion, as no table of readings has."""
+    return _has(path, lambda columns: int({*QUATERNION} <= columns or {*SCALAR_FIRST} <= columns))
+
+
+def _has(path: Path, count: Callable[[set[str]], int]) -> bool:
+    """Whether some headings of a table have columns that are counted."""
 
     def known(headings: list[Heading]) -> int:
-        return sum(column_name(heading) in names for heading in translated(headings))
+        return count({column_name(heading) for heading in translated(headings)})
 
     return find_table(path, RecordingError, known)[1] is not None
 
@@ -89,7 +101,9 @@ def _motion(
     brushes, by_brush = _brushes(table)
     if flows is None and brushes.any():
         flows = np.ones(len(brushes))
-    time, speed = table.find(*TIME), None if robot else table.find(*SPEED)
+    # Beside o and a, the letter t is an angle of Kawasaki's.
+    times = TIME[:-1] if table.find('o') is not None and table.find('a') is not None else TIME
+    time, speed = table.find(*times), None if robot else table.find(*SPEED)
     if time is None and speed is None:
         or_speed = '' if robot else ', or speed_m_per_s for programmed passes'
         raise RecordingError(
@@ -174,7 +188,9 @@ def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
     if name is None:
         trigger, flow = table.find(*TRIGGER), table.find(*FLOW)
     elif name.strip() in texts:
-        trigger, flow = texts.index(name.strip()), None
+        trigger, flow = texts.index(name.strip()), table.find(*FLOW)
+        if trigger == flow:  # with a unit it says only whether the gun is on
+            trigger, flow = (None, flow) if table.units([flow]) == {''} else (trigger, None)
     else:
         raise RecordingError(f'no column is called {name}; {did_you_mean(name, texts)}')
     if trigger is None and flow is None:

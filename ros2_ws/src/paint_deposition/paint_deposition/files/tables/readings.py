@@ -33,7 +33,14 @@ from paint_deposition.files.tables.reading_columns import (
     plain,
     refuse_misleading,
 )
-from paint_deposition.files.tables.sheets import Sheet, cell_at, is_nothing, is_value, text_of
+from paint_deposition.files.tables.sheets import (
+    Sheet,
+    cell_at,
+    is_comment,
+    is_nothing,
+    is_value,
+    text_of,
+)
 from paint_deposition.files.tables.table import Table
 
 GUESSED = 'no unit is given'
@@ -83,7 +90,9 @@ class ReadingTable(Table):
         if films and layout.zero == 'missing':
             table = table.without(thick, lambda _, cell: table.number(cell) == 0.0)
         # The rows that are readings or points, and their order.
-        kept, missing, table.left_out = table._sorted_rows(films, numeric, {*labels}, bare)
+        below = sheet.rows[0 if header is None else header + 1 :]
+        marked = sum(is_comment(row) and any(map(is_value, row[1:])) for row in below)
+        kept, missing, table.left_out = table._sorted_rows(films, numeric, {*labels}, bare, marked)
         table.left_out += failed
         if not kept:
             table.refuse_errors()
@@ -125,17 +134,19 @@ class ReadingTable(Table):
         return f', {len(failed)} of them failed by {named}' if failed else ''
 
     def _sorted_rows(
-        self, films: bool, numeric: list[int], labels: set[str], bare: bool
+        self, films: bool, numeric: list[int], labels: set[str], bare: bool, marked: int
     ) -> tuple[list[int], list[int], str]:
         """Rows that are readings or points, rows without a reading, and in words what else is.
 
         A row with a place is one, whatever its label. One without a place, or in a table without
         places, is a statistic if it begins with the name of one and not with the label of a
         listed point. In a ``bare`` file, without headings, a row as wide as the others is one too.
+        So many others with numbers are ``marked`` as comments.
         """
         kept: list[int] = []
         missing: list[int] = []
         count = {'without a reading': 0, 'of statistics': 0, 'of other text': 0}
+        count['that begin with #'] = marked
         width, thick = len(self.headings), self.at['thickness'] if films else []
         places = [k for q in (*AXES, *ON_FACE) for k in self.at.get(q, [])]
         by = self.named_by

@@ -5,6 +5,7 @@ import json
 import re
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from io import BytesIO, StringIO
@@ -81,7 +82,9 @@ def _content(path: Path, refusal: type[PaintError]) -> bytes:
     if not (content.startswith(WORKBOOKS[0]) and zipfile.is_zipfile(BytesIO(content))):
         return content
     with zipfile.ZipFile(BytesIO(content)) as package:
-        names = {Path(name).name: name for name in package.namelist() if name[-1:] != '/'}
+        members = [name for name in package.namelist() if name[-1:] != '/']
+        alike = Counter(Path(name).name for name in members)
+        names = {n if alike[Path(n).name] > 1 else Path(n).name: n for n in members}
         if {'[Content_Types].xml', 'content.xml'} & {*names}:
             return content  # a workbook
         require_small_package(package)
@@ -93,7 +96,7 @@ def _table_in(names: Collection[str], path: Path, refusal: type[PaintError]) -> 
     for wanted in FOLDERS.values():
         if {*wanted} <= {*names}:
             return wanted
-    visible = sorted(name for name in names if not name.startswith('.'))
+    visible = sorted(name for name in names if not Path(name).name.startswith('.'))
     if len(visible) != 1:
         raise refusal(f'{path} holds {some(visible, 6) or "no file"}; name the one with the table')
     return visible
