@@ -201,6 +201,7 @@ class FilmIntegrator:
         """Values (..., V) of the sorted points in the order of the caller's."""
         sorted_back = np.empty(values.shape)
         sorted_back[..., self._blocks.order] = values
+        sorted_back.flags.writeable = False  # one film is read by many
         return sorted_back
 
     @property

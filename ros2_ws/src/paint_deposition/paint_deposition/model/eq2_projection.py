@@ -29,7 +29,7 @@ class Projection(BaseModel):
         """Distance of the TCP from the part at which the part lies on the model plane [m]."""
         return self.model_plane_m - self.emission_offset_m
 
-    def widening(self, standoff_m: float) -> float:
+    def magnification(self, standoff_m: float) -> float:
         """How many times wider the pattern is at a standoff [m] than on the model plane."""
         return (standoff_m + self.emission_offset_m) / self.model_plane_m
 

@@ -35,5 +35,5 @@ class PatternSpread(Effect):
     def pattern_scale(ray: Ray, exponent: float) -> float:
         return power(ray.standoff_ratio, -exponent)
 
-    def reach(self) -> float:
+    def widening(self) -> float:
         return STANDOFF_RANGE ** abs(self.exponent)
