@@ -110,3 +110,11 @@ def test_what_a_coat_adds_to_a_wet_film_is_the_film_less_that_before():
 def test_names_that_do_not_go_are_refused(names, message):
     with pytest.raises(PaintError, match=message):
         Coats.of_guns(names, 3)
+
+
+def test_a_film_that_runs_away_is_warned_of(panel):
+    """The law of sag is of first order: pushed too far it takes away more than is there."""
+    said = 'and no film is below 0: the law of sag does not hold at this size'
+    for count, warned in ((1, False), (8, True)):
+        warnings = pd.simulate(panel, [BASE] * count, SAGGING).warnings
+        assert any(said in warning for warning in warnings) == warned

@@ -55,12 +55,18 @@ def collapse_um(
         (N,) film [um].
 
     Raises:
-        PlanError: speed or standoff is not above zero.
+        PlanError: speed or standoff is not above zero, or the plane is behind the emission point.
     """
     standoff = model.projection.nominal_standoff_m if standoff_m is None else standoff_m
     for name, value in (('speed_m_per_s', speed_m_per_s), ('standoff_m', standoff)):
         if not (math.isfinite(value) and value > 0.0):
             raise PlanError(f'{name} is {value:g}; give a number above 0')
+    offset_m, nearest_m = model.projection.emission_offset_m, model.projection.nearest_m
+    if standoff + offset_m <= nearest_m:
+        raise PlanError(
+            f'standoff_m is {standoff:g} and the emission point of the model lies {-offset_m:g} m '
+            f'in front of the TCP: give a standoff above {nearest_m - offset_m:g}'
+        )
     if model.effects:
         way = -1.0 if backwards else 1.0
         roll = travel_rad + (math.pi if turned else 0.0)
