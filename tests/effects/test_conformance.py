@@ -57,6 +57,7 @@ def test_it_says_what_it_is(effect: type[Effect]):
         assert effect.source
         assert effect.family in FAMILIES
         assert set(effect.rivals) <= set(EFFECTS) - {effect.id}
+        assert all(effect.id in EFFECTS[rival].rivals for rival in effect.rivals)
         assert problem_in_words(effect) is None
 
 

@@ -5,6 +5,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,9 @@ from numba import njit
 
 import paint_deposition as pd
 from booth import SAMPLES, painted, panel, path_of, serpentine
-from paint_deposition.effects.base import Effect
+from paint_deposition.effects.base import Effect, PathContext, SprayPath
 from paint_deposition.effects.catalogue import EFFECTS, effect_class, load_effect_file
-from paint_deposition.effects.trial import TRIAL_RAYS
+from paint_deposition.effects.trial import NEEDS, PLACES, TRIAL_RAYS
 from paint_deposition.errors import ModelError
 from paint_deposition.kernel.laws import Ray, in_precision
 
@@ -175,9 +176,17 @@ def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
     assert (SAMPLES / 'my_effect.py').relative_to(repository).as_posix() in text
     for name in Ray._fields:
         assert f'`{name}`' in text
-    for place in ('flux_factor', 'pattern_scale', 'on_path', 'on_film', 'on_gauge'):
+    for place in (*PLACES, 'widening'):
         assert f'`{place}(' in text
         assert hasattr(Effect, place)
+    context = (*(field.name for field in fields(PathContext)), 'downhill', 'across')
+    for name in (
+        *(field.name for field in fields(SprayPath)),
+        *context,
+        'slope_per_m',
+        *NEEDS[1:],
+    ):
+        assert f'`{name}`' in text or f"`'{name}'`" in text or f"'{name}'`" in text
 
 
 def test_a_missing_file_is_named(tmp_path: Path):

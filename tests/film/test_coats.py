@@ -74,6 +74,8 @@ def test_the_gauge_is_one_and_each_dried_coat_may_sag_by_its_own(panel):
         pd.simulate(panel, motions, [SAGGING, PLAIN], coats=coats, wet_on_wet=True)
     with pytest.raises(ModelError, match=r'gun 1 and gun 2 differ .*\(gauge_gain\)'):
         pd.simulate(panel, motions, [PLAIN.with_effect(GaugeGain.typical()), PLAIN], coats=coats)
+    with pytest.raises(PaintError, match='3 names for 2 guns: give one for each, or none'):
+        pd.simulate(panel, motions, names=['left', 'right', 'roof'])
 
 
 @pytest.mark.parametrize('wet_on_wet', [False, True])

@@ -19,8 +19,8 @@ LEVEL, SESSION_UM = 0.03, 0.3
 # Share of the paint that still arrives without voltage.
 WITHOUT_VOLTAGE = 0.75
 STANDOFF_STEP_M, LONGER_OPEN_S = 0.06, 0.3
-# What vanishes with the field, and with the booth's air.
-OF_VOLTAGE = ('convex_attraction', 'edge_build', 'faraday_shielding')
+# What vanishes with the field, and with the booth's air; surface tension draws a rim, too.
+OF_VOLTAGE = ('convex_attraction', 'faraday_shielding')
 OF_DRAUGHT = ('air_drift',)
 
 

@@ -96,8 +96,11 @@ def test_errors_of_several_effects_are_independent(study):
     np.testing.assert_allclose(both, sum(each), atol=1e-9 * both.max())
 
 
-def test_where_an_effect_was_switched_off_or_no_paint_lands_its_law_has_no_error():
-    """Edge build needs the voltage; on the back of a plate the model predicts exactly 0."""
+def test_where_an_effect_was_switched_off_or_no_paint_lands_its_law_has_no_error(
+    monkeypatch,
+):
+    """On the back of a plate the model predicts exactly 0."""
+    monkeypatch.setattr(type(EDGE), 'needs', 'voltage')
     off = on_door(switched_off=frozenset(['voltage']))
     doors = study_of(on_door(), replace(off, name='without voltage'))
     plate = study_of(plate_with_a_back())
@@ -198,6 +201,14 @@ def test_an_addition_is_in_micrometres():
     assert best.name in ('exponential', 'saturating')
     assert best.formula.startswith('addition [um] = ')
     assert 'level_um' in best.parameters
+    assert fitting_forms(x, np.zeros(KNOTS), sd, unit='m', addition=True) == ()
+
+
+def test_a_form_about_a_value_below_zero_is_written_with_a_plus():
+    x = np.linspace(-4.0, 2.0, KNOTS)
+    forms = fitting_forms(x, 0.9 + 0.1 * x, np.full(KNOTS, 0.004), unit='1/m')
+    assert any('(x + 1)' in form.formula for form in forms)
+    assert not any('- -' in form.code + form.formula for form in forms)
 
 
 @pytest.mark.parametrize(

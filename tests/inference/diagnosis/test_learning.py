@@ -121,8 +121,9 @@ def test_a_law_that_improves_one_part_only_is_not_chosen_by_that_part():
 
 
 @pytest.mark.slow
-def test_a_fold_that_calls_for_another_set_goes_no_further():
+def test_a_fold_that_calls_for_another_set_goes_no_further(monkeypatch):
     """Only one part had the voltage that the effect needs: from the others it is not known."""
+    monkeypatch.setattr(EFFECTS['edge_build'], 'needs', 'voltage')
     one, *others = gauged(BASE, seed=0, orders=THREE).experiments
     with_edge = gauged(BASE.with_effect(EDGE), seed=0, orders=THREE[:1]).experiments[0]
     off = frozenset(['voltage'])

@@ -65,7 +65,11 @@ class DepositionModel(BaseModel):
         return self.model_copy(update={'planar': new[0], 'brushes': brushes})
 
     def with_brush(self, number: int) -> 'DepositionModel':
-        """A copy that has one of the brushes only, or ModelError; 0 is the only one."""
+        """A copy with the pattern of one brush; number 0 where there is one only.
+
+        Raises:
+            ModelError: the model does not have that brush.
+        """
         if number != ONLY_BRUSH and not self.brushes:
             raise ModelError(
                 f'brush {number} is not in the model: it has one pattern, planar, without a number'

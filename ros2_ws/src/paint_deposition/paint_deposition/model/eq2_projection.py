@@ -1,9 +1,10 @@
 """Eq. (2) of Conner et al. (IROS 2002): the planar model projected onto any surface.
 
-    flux(s) = (Omega / l)^2 <e, n> / <e, z>^3 d(q),    q = Omega (s - p) / <s - p, z>
+    D(s, p) = (Omega / L)^2 <e, n> / <e, z>^3 d(q),    q = Omega (s - o) / <s - o, z>
 
-with the emission point p, the unit vector e from it to the surface point s at a distance l, the
-bell's axis z and the surface normal n, turned against e. ``kernel/eq2_flux.py`` sums it.
+with the pose p, its emission point o, the unit vector e from it to the surface point s at a
+distance L, the bell's axis z and the surface normal n, which points into the part.
+``kernel/eq2_flux.py`` sums it.
 """
 
 from pydantic import BaseModel, ConfigDict, Field

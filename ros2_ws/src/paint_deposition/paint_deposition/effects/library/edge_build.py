@@ -9,12 +9,12 @@ class EdgeBuild(Effect):
     """The field crowds on free edges, and surface tension draws wet paint to them.
 
     Acts on the film: times 1 + a exp(-d / l), d the distance to the nearest free edge. Only ever
-    adds; on all sides alike, so it is no matter of gravity.
+    adds; on all sides alike, so it is no matter of gravity. Surface tension draws a rim without
+    voltage, too.
     """
 
     id = 'edge_build'
     family = 'boundary'
-    needs = 'voltage'
     covariates = ('edge_distance_m',)
     free_law = 'factor'
     signature = 'a rim of more paint along all free edges alike'
