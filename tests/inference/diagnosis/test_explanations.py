@@ -10,6 +10,7 @@ from inference.diagnosis.linear import linear_fit
 from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a_back, study_of
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
+from paint_deposition.effects.trial import COVARIATES
 from paint_deposition.inference.diagnosis import explanations
 from paint_deposition.inference.diagnosis.closed_forms import fitting_forms, forms_of
 from paint_deposition.inference.fitting.parameters import FreeParameters
@@ -73,6 +74,10 @@ def test_geometry_and_gauge_have_no_law_that_could_be_off(study, effect):
     for of in (explanations.law_errors, another_form):
         assert errors(study, effect.typical(), of=of).shape == (len(study), 0)
     assert errors(study, effect.typical(), EDGE).shape == errors(study, EDGE).shape
+
+
+def test_an_own_effect_may_name_any_covariate_and_no_other(study):
+    assert set(COVARIATES) == set(study.rays(MODEL)[0].along)
 
 
 def test_a_law_that_may_have_any_form_is_off_by_a_share_of_its_largest_effect(study):
