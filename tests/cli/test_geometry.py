@@ -102,9 +102,9 @@ def test_a_right_geometry_is_one_line_without_a_warning(panel, tmp_path):
         (partial(shifted, 0.0, 0.15, 0.0), ['TCP is 0.09', 'the model plane is 0.25 m']),
         (partial(shifted, 0.75, 0.0, 0.0), ['0.75 m aside', 'toward +x']),
         (partial(shifted, 0.0, 0.0, -0.3), ['0.30 m aside', 'toward -z']),
-        (partial(shifted, 0.0, 0.0, -1.1), ['the passes miss the part', 'span x -0.70 to 0.70']),
+        (partial(shifted, 0.0, 0.0, -1.1), ['the passes miss the part', 'span x -0.698 to 0.698']),
         (partial(in_another_frame, 90.0, (0.0, 0.0, 0.0)),
-         ['another frame than the mesh', "'base_link' span x 0.25 to 0.25, y -0.70 to 0.70"]),
+         ['another frame than the mesh', "'base_link' span x 0.250 to 0.250, y -0.698 to 0.698"]),
         (partial(in_millimetres, 0.001), ['path is 0.002 m long, the part 1.44 m', 'too small']),
         (with_one_pass_above, ['pass 1 of 4 misses the part', 'trigger']),
     ],
@@ -122,8 +122,8 @@ def test_an_odd_geometry_is_warned_of_by_its_cause(surface, motion, words):
         (in_millimetres, ['look like millimetres', 'in metres']),
         (
             partial(in_another_frame, 90.0, (1.8, 3.2, 1.1)),
-            ['another frame', "'base_link' span x 2.05 to 2.05", 'y 2.50 to 3.90',
-             'z 0.80 to 1.40', 'mesh x -0.60 to 0.60', 'z -0.40 to 0.40', '--part-pose'],
+            ['another frame', "'base_link' span x 2.050 to 2.050", 'y 2.502 to 3.898',
+             'z 0.800 to 1.400', 'mesh x -0.600 to 0.600', 'z -0.400 to 0.400', '--part-pose'],
         ),
     ],
 )  # fmt: skip

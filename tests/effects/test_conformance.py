@@ -12,6 +12,7 @@ import booth
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES, read_effect_file
 from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.trial import problem_in_words
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.kernel.laws import Ray, in_precision
 from paint_deposition.part.points import SurfacePoints
@@ -56,6 +57,8 @@ def test_it_says_what_it_is(effect: type[Effect]):
         assert effect.source
         assert effect.family in FAMILIES
         assert set(effect.rivals) <= set(EFFECTS) - {effect.id}
+        assert all(effect.id in EFFECTS[rival].rivals for rival in effect.rivals)
+        assert problem_in_words(effect) is None
 
 
 @EFFECT
@@ -104,7 +107,7 @@ def test_neutral_changes_nothing(effect: type[Effect]):
     for law in (effect.flux_factor, effect.pattern_scale):
         if law is not None:
             assert law(Ray(0.1, 0.2, 1.7, 0.6, 0.4), *neutral.values()) == 1.0
-    assert neutral.reach() == 1.0
+    assert neutral.widening() == 1.0
     assert neutral.shadow() == 0.0
 
 
@@ -191,6 +194,12 @@ def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect])
     # A stencil sees more than the triangles around a vertex.
     tolerance = 0.02 if effect.needs_slope else 1e-6
     np.testing.assert_allclose(readings, sheet[some], rtol=0, atol=tolerance * sheet.max())
+
+
+def test_an_effect_that_is_replaced_keeps_its_place():
+    fog, gain = EFFECTS['overspray_fog'].typical(), EFFECTS['edge_build'].typical()
+    model = booth.MODEL.with_effect(fog).with_effect(gain).with_effect(fog.absent)
+    assert model.effects == (fog.absent, gain)
 
 
 @pytest.mark.slow

@@ -125,6 +125,9 @@ def test_flow_drifts_from_pass_to_pass():
         one_pass = path.select(path.spray_pass == number)
         plain, film = (painted(panel(), one_pass, *e).raw_um for e in ((), (drifting,)))
         np.testing.assert_allclose(film, plain * 0.95 ** (number - MIDDLE_PASS), rtol=1e-9)
+    # A pass by itself, as of a recommendation, has no number.
+    alone = path.with_(time_s=np.full(len(path), np.nan))
+    assert np.array_equal(after(drifting, alone).flow, path.flow)
 
 
 @pytest.mark.parametrize('lag', [trigger_lag(0.05, 0.05), EFFECTS['pose_lag'](lag_s=0.02)])

@@ -5,6 +5,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,9 @@ from numba import njit
 
 import paint_deposition as pd
 from booth import SAMPLES, painted, panel, path_of, serpentine
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS, TRIAL_RAY, effect_class, load_effect_file
+from paint_deposition.effects.base import Effect, PathContext, SprayPath
+from paint_deposition.effects.catalogue import EFFECTS, effect_class, load_effect_file
+from paint_deposition.effects.trial import NEEDS, PLACES, TRIAL_RAYS
 from paint_deposition.errors import ModelError
 from paint_deposition.kernel.laws import Ray, in_precision
 
@@ -51,12 +53,14 @@ def test_the_sample_is_short_and_paints_less_the_faster_the_gun():
 def test_a_law_may_use_all_of_the_ray_and_numbers_of_its_module(own):
     path = own(
         ('* ray.speed_m_per_s', '* ray.standoff_ratio'),
-        ('return exp', 'return GAIN * (1 + ray.x_m / 3 - ray.y_m**2) * ray.cos_incidence * exp'),
+        ('return exp', 'shape = GAIN * (1 + ray.x_m / 3 - ray.y_m**2) * ray.cos_incidence\n'
+         '        return 1 + loss_per_m_per_s * shape * exp'),
         ('class WakeLoss', 'GAIN = 0.7\n\n\nclass WakeLoss'),
     )  # fmt: skip
     law = load_effect_file(path).flux_factor
-    compiled = njit(in_precision(law, np.float32))(TRIAL_RAY, np.float32(0.5))
-    assert compiled == pytest.approx(law(Ray(*map(float, TRIAL_RAY)), 0.5), rel=1e-6)
+    for ray in TRIAL_RAYS:
+        compiled = njit(in_precision(law, np.float32))(ray, np.float32(0.5))
+        assert compiled == pytest.approx(law(Ray(*map(float, ray)), 0.5), rel=1e-6)
 
 
 def test_the_same_file_is_the_same_class_and_can_go_to_another_process(own):
@@ -67,9 +71,26 @@ def test_the_same_file_is_the_same_class_and_can_go_to_another_process(own):
     assert pickle.loads(pickle.dumps(effect.typical())) == effect.typical()
 
 
+def line(text: str) -> list[tuple[str, str]]:
+    return [("    family = 'time'\n", f"    family = 'time'\n    {text}\n")]
+
+
 def with_place(head: str, body: str) -> list[tuple[str, str]]:
     method = f'    def {head}:\n        {body}\n\n'
     return [('    @staticmethod', f'{method}    @staticmethod')]
+
+
+def film(body: str) -> list[tuple[str, str]]:
+    return with_place('on_film(self, film_um, points)', body)
+
+
+def along(body: str) -> list[tuple[str, str]]:
+    return with_place('on_path(self, path, context)', body)
+
+
+def shape(name: str, low: str) -> str:
+    rest = f"{low}, high=2.0, unit='m', role='shape', description='l'"
+    return f'{name}: float = parameter(2.0, {rest})'
 
 
 @pytest.mark.parametrize(
@@ -82,7 +103,8 @@ def with_place(head: str, body: str) -> list[tuple[str, str]]:
         ([("    family = 'time'\n", '')], 'has no family'),
         ([('loss_per_m_per_s: float =', 'loss_per_m_per_s =')], 'line 10: PydanticUserError'),
         ([('= parameter(\n        0.0, low', '= dict(\n        low')], 'without parameter(...)'),
-        ([("unit='1/(m/s)'", "unit='1/(m/s)', role='shape'")], 'has no amplitude'),
+        ([("low=0.0", 'low=0.1'), ("unit='1/(m/s)'", "unit='1/(m/s)', role='shape'"),
+          ('0.0, low', '0.2, low')], 'has no amplitude'),
         ([('typical=0.2, ', '')], 'line 17: TypeError: an amplitude needs its typical size'),
         ([('typical=0.2', 'typical=0.0')], 'is absent at its typical size'),
         ([('low=0.0', 'low=0.1')], 'outside its bounds; widen them'),
@@ -101,6 +123,36 @@ def with_place(head: str, body: str) -> list[tuple[str, str]]:
         (with_place('on_film(self, film_um, points)', 'return points.no_such'),
          'fails (AttributeError'),
         (with_place('on_path(self, path, context)', 'return None'), 'return path.with_(...)'),
+        (film('film_um += 1.0; return film_um'), 'has an on_film that changes what it is given'),
+        (film('return film_um.tolist()'), 'return an array with one finite number a point'),
+        (film('return film_um + (film_um > 9.0) * points.edge_distance_m'),
+         'has an on_film that does not return a finite film'),
+        (film('return film_um * 1.1'), 'has an on_film that changes something at the neutral'),
+        (along('path.flow[:] = 1.0; return path'), 'has an on_path that changes what it is given'),
+        (along('return path.with_(flow=path.flow[:, None])'), 'gives flow the shape'),
+        (along('return path.with_(dwell_s=path.dwell_s / 0.0)'), 'gives dwell_s that is not fin'),
+        (along('return path.with_flow_scaled(-0.2)'), 'gives flow of -0.2; give 0 or more'),
+        # A law that is there at its neutral value is not absent there.
+        ([('return exp', 'return 1.0 + ray.speed_m_per_s * exp')], 'it must be 1 there'),
+        (with_place('shadow(self)', 'return 0.5'), 'has a shadow of 0.5 at the neutral values'),
+        (with_place('shadow(self)', 'return 2.0'), 'has a shadow of 2; give 0 to 1'),
+        (with_place('widening(self)', 'return 0.5'), 'has a widening of 0.5; give 1 to inf'),
+        # What it declares.
+        ([('flux_factor', 'pattern_scale')], 'has a pattern_scale and no widening'),
+        (with_place('reach(self)', 'return 2.0'), 'which is called widening now; rename it'),
+        ([('high=2.0', "high=float('inf')")], 'loss_per_m_per_s high=inf; give a finite number'),
+        ([('0.0, low', 'False, low')], 'loss_per_m_per_s neutral=False; give a number'),
+        ([("unit='1/(m/s)'", "unit='1/(m/s)', role='size'")], "the role 'size'; give 'amplitude'"),
+        ([('_per_s: float', '_per_s: int')], 'as int; a fit varies it: declare it as float'),
+        (line(shape('length_m', 'low=0.0')), 'gives the shape length_m low=0; a length or time'),
+        (line(shape('length_m', 'low=2.0')), 'low=2 and high=2; high must be above low'),
+        (line(shape('shadow', 'low=1.0')), 'has a parameter shadow, a name that every effect has'),
+        # How far a diagnosis may trust it.
+        (line("needs = 'volts'"), "has needs = 'volts'; give one of voltage, draught"),
+        (line("free_law = 'sum'"), "has free_law = 'sum'; give one of factor, addition"),
+        (line("covariates = 'time_s'"), "has covariates = 'time_s'; give names, ('time_s',)"),
+        (line("covariates = ('time',)"), "'time', which is none; did you mean 'time_s'"),
+        (line("covariates = ('time_s',); free_law = 'addition'"), 'over time_s a law is a factor'),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_one_line_with_its_remedy(own, changes, message):
@@ -124,9 +176,17 @@ def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
     assert (SAMPLES / 'my_effect.py').relative_to(repository).as_posix() in text
     for name in Ray._fields:
         assert f'`{name}`' in text
-    for place in ('flux_factor', 'pattern_scale', 'on_path', 'on_film', 'on_gauge'):
+    for place in (*PLACES, 'widening'):
         assert f'`{place}(' in text
         assert hasattr(Effect, place)
+    context = (*(field.name for field in fields(PathContext)), 'downhill', 'across')
+    for name in (
+        *(field.name for field in fields(SprayPath)),
+        *context,
+        'slope_per_m',
+        *NEEDS[1:],
+    ):
+        assert f'`{name}`' in text or f"`'{name}'`" in text or f"'{name}'`" in text
 
 
 def test_a_missing_file_is_named(tmp_path: Path):
@@ -173,7 +233,7 @@ class Scaled(Effect):
 
     @staticmethod
     def flux_factor(ray: Ray, a: float) -> float:
-        return 1.0 + GAIN * (raised(a) - a)
+        return 1.0 + GAIN * a * raised(a)
 """
 # One run: the law, compiled and kept on disk as a kernel is, and how often it was found there.
 RUN = """
@@ -208,5 +268,5 @@ def test_what_is_edited_between_runs_counts_in_the_next_and_what_is_not_is_found
         done = subprocess.run(command, capture_output=True, text=True, env=environment)
         assert done.returncode == 0, done.stderr
         factor, found = done.stdout.split()
-        assert float(factor) == pytest.approx(1.0 + 2.0 * lift)
+        assert float(factor) == pytest.approx(1.0 + 2.0 * 0.5 * (0.5 + lift))
         assert int(found) == hits

@@ -74,6 +74,8 @@ def test_the_gauge_is_one_and_each_dried_coat_may_sag_by_its_own(panel):
         pd.simulate(panel, motions, [SAGGING, PLAIN], coats=coats, wet_on_wet=True)
     with pytest.raises(ModelError, match=r'gun 1 and gun 2 differ .*\(gauge_gain\)'):
         pd.simulate(panel, motions, [PLAIN.with_effect(GaugeGain.typical()), PLAIN], coats=coats)
+    with pytest.raises(PaintError, match='3 names for 2 guns: give one for each, or none'):
+        pd.simulate(panel, motions, names=['left', 'right', 'roof'])
 
 
 @pytest.mark.parametrize('wet_on_wet', [False, True])
@@ -110,3 +112,11 @@ def test_what_a_coat_adds_to_a_wet_film_is_the_film_less_that_before():
 def test_names_that_do_not_go_are_refused(names, message):
     with pytest.raises(PaintError, match=message):
         Coats.of_guns(names, 3)
+
+
+def test_a_film_that_runs_away_is_warned_of(panel):
+    """The law of sag is of first order: pushed too far it takes away more than is there."""
+    said = 'and no film is below 0: the law of sag does not hold at this size'
+    for count, warned in ((1, False), (8, True)):
+        warnings = pd.simulate(panel, [BASE] * count, SAGGING).warnings
+        assert any(said in warning for warning in warnings) == warned

@@ -14,7 +14,8 @@ from booth import LOOKING_ALONG_Y
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.occlusion import Occlusion
-from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.errors import ModelError
+from paint_deposition.film.integrator import FilmIntegrator, after_film_effects, gauge_reading_um
 from paint_deposition.film.layout import SIGHT_STEP_M, emission_points_m, term_weights
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
@@ -110,6 +111,31 @@ def test_the_film_is_in_proportion_to_flow_k1_and_time():
     slow = painted(points, straight_pass(np.linspace(0.0, 4.0, 401))).film_um
     fast = painted(points, straight_pass(np.linspace(0.0, 2.0, 401))).film_um
     assert largest_error(slow, 2.0 * fast) < 1e-12
+
+
+class Broken(EFFECTS['sag']):
+    """A user's law that fails on bare metal."""
+
+    def on_film(self, film_um, points):
+        return film_um * (film_um / film_um)
+
+    def on_gauge(self, film_um, points):
+        return np.where(film_um > 0.0, np.inf, film_um)
+
+
+def test_a_film_is_finite_and_nobody_changes_it():
+    points, path = lying_plane(count=21), spray_path(straight_pass(np.arange(0.0, 2.0, 0.02)))[0]
+    film_um = painted(points, path).film_um
+    with pytest.raises(ValueError, match='read-only'):
+        film_um += 1.0
+    broken = [Broken.typical()]
+    with (
+        np.errstate(all='ignore'),
+        pytest.raises(ModelError, match="'sag' gives a film of nan µm at"),
+    ):
+        after_film_effects(np.zeros(len(points)), broken, points)
+    with pytest.raises(ModelError, match="'sag' gives a reading of inf µm at 441 of 441 points"):
+        gauge_reading_um(film_um, broken, points)
 
 
 def test_moving_part_and_gun_together_changes_nothing():

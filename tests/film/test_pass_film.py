@@ -10,6 +10,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.pass_film import collapse_um, pass_film_um, sampled_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.model.eq3_collapse import half_width_m
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
@@ -100,7 +101,19 @@ def test_half_width_is_where_the_profile_has_half_its_peak():
     assert half_width_m(pass_) == pytest.approx(0.574, abs=1e-3)
 
 
-@pytest.mark.parametrize(('speed', 'standoff'), [(0.0, 0.25), (-1.0, 0.25), (0.2, 0.0)])
-def test_impossible_passes_are_refused(speed, standoff):
-    with pytest.raises(PlanError, match='give a number above 0'):
-        collapse_um(DepositionModel(), ACROSS_M, speed, standoff)
+@pytest.mark.parametrize(
+    ('speed', 'standoff', 'offset', 'remedy'),
+    [
+        (0.0, 0.25, 0.05, 'give a number above 0'),
+        (-1.0, 0.25, 0.05, 'give a number above 0'),
+        (0.2, 0.0, 0.05, 'give a number above 0'),
+        (0.2, 0.03, -0.04, r'0.04 m in front of the TCP: give a standoff above 0.041'),
+    ],
+)
+def test_impossible_passes_are_refused(speed, standoff, offset, remedy):
+    model = DepositionModel(projection=Projection(emission_offset_m=offset))
+    for one in (model, model.with_effect(EFFECTS['gun_wake'].typical())):
+        with pytest.raises(PlanError, match=remedy):
+            collapse_um(one, ACROSS_M, speed, standoff)
+        with pytest.raises(PlanError, match=remedy):
+            sampled_collapse(one, speed, standoff_m=standoff)

@@ -65,6 +65,13 @@ def test_below_the_floor_it_stays_there(real, floor):
     assert exp2_all(far).tolist() == [2.0**floor] * 4
 
 
+@pytest.mark.parametrize(('real', 'ceiling'), [(np.float32, 126.0), (np.float64, 1023.0)])
+def test_above_the_ceiling_an_exponential_stays_there(real, ceiling):
+    far = np.array([0.695 * ceiling, 1e3, 1e6, 1e30], real)
+    assert exp_all(far).tolist() == [2.0**ceiling] * 4
+    assert power_all(np.full(1, 1e30, real), real(20.0)).tolist() == [2.0**ceiling]
+
+
 def test_outside_compiled_code_they_are_the_c_librarys():
     assert exp(-1.3) == math.exp(-1.3)
     assert exp2(-1.3) == 2.0**-1.3

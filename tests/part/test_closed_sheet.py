@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface, toward_the_gun
+from paint_deposition.part.surface import Surface, toward_the_guns
 from surfaces import hemmed, solid, triangulated
 
 pytestmark = pytest.mark.slow
@@ -36,7 +36,7 @@ def parts(side: str, thickness_m: float, drawn_along: str = 'normals') -> tuple[
     seen = []
     for vertices, faces in (open_sheet, solid(*open_sheet, thickness_m, drawn_along)):
         surface = Surface.from_triangles(turn.apply(vertices), faces, 0.03)
-        seen.append(toward_the_gun(surface, eyes, np.tile(looking, (len(eyes), 1))))
+        seen.append(toward_the_guns(surface, [(eyes, np.tile(looking, (len(eyes), 1)))]))
     return seen[0], seen[1]
 
 
@@ -77,9 +77,9 @@ def test_any_motion_in_front_tells_the_same_side_to_the_last_bit(tilt_deg, poses
     axes = Rotation.from_euler('xyz', tilts, degrees=True).apply([-1.0, 0.0, 0.0])
     unseen = Surface(**{name: getattr(shell, name) for name in (
         'vertices_m', 'faces', 'normals', 'vertex_areas_m2', 'down', 'rim_m')})  # fmt: skip
-    told = toward_the_gun(unseen, eyes, axes)
+    told = toward_the_guns(unseen, [(eyes, axes)])
     np.testing.assert_array_equal(told.outward, shell.outward)
-    assert toward_the_gun(shell, eyes, axes) is shell
+    assert toward_the_guns(shell, [(eyes, axes)]) is shell
 
 
 def test_readings_without_normals_lie_on_the_side_that_the_gun_paints():

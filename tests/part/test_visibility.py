@@ -6,7 +6,7 @@ from trimesh.creation import box
 from trimesh.util import concatenate
 
 from paint_deposition.part.orientation import across_axis, downhill_axis
-from paint_deposition.part.surface import Surface, facing, toward_the_gun
+from paint_deposition.part.surface import Surface, facing, toward_the_guns
 from surfaces import ball, flat, fold, refined, triangulated
 
 
@@ -124,8 +124,8 @@ AHEAD = np.tile([0.0, 1.0, 0.0], (4, 1))
 
 def test_a_part_sprayed_from_behind_is_turned_and_says_so():
     surface = refined(ball(0.5), 0.05)
-    assert toward_the_gun(surface, EYES, AHEAD) is surface
-    turned = toward_the_gun(surface, EYES * [1, -3, 1], -AHEAD)
+    assert toward_the_guns(surface, [(EYES, AHEAD)]) is surface
+    turned = toward_the_guns(surface, [(EYES * [1, -3, 1], -AHEAD)])
     np.testing.assert_array_equal(turned.normals, -surface.normals)
     np.testing.assert_allclose(turned.points().curvature_per_m, -surface.points().curvature_per_m)
     assert facing(turned, EYES * [1, -3, 1], -AHEAD)[:2] == (3, 0)

@@ -101,9 +101,9 @@ def test_places_lie_on_the_surface_apart_and_off_the_edge(study, fit, drift_or_t
 
 def test_without_voltage_what_needs_it_is_gone(study):
     experiment = BY_KEY['voltage_off'].made(study.campaign.experiments[0])
-    edge, drift = EFFECTS['edge_build'].typical(), AirDrift(shift_down_m=0.03)
-    left = pd.DepositionModel(effects=(edge, drift)).without(experiment.switched_off)
-    assert left.effect('edge_build').is_neutral
+    ridge, drift = EFFECTS['convex_attraction'].typical(), AirDrift(shift_down_m=0.03)
+    left = pd.DepositionModel(effects=(ridge, drift)).without(experiment.switched_off)
+    assert left.effect('convex_attraction').is_neutral
     assert left.effect('air_drift') == drift
 
 

@@ -10,6 +10,7 @@ from inference.diagnosis.linear import linear_fit
 from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a_back, study_of
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
+from paint_deposition.effects.trial import COVARIATES
 from paint_deposition.inference.diagnosis import explanations
 from paint_deposition.inference.diagnosis.closed_forms import fitting_forms, forms_of
 from paint_deposition.inference.fitting.parameters import FreeParameters
@@ -75,6 +76,10 @@ def test_geometry_and_gauge_have_no_law_that_could_be_off(study, effect):
     assert errors(study, effect.typical(), EDGE).shape == errors(study, EDGE).shape
 
 
+def test_an_own_effect_may_name_any_covariate_and_no_other(study):
+    assert set(COVARIATES) == set(study.rays(MODEL)[0].along)
+
+
 def test_a_law_that_may_have_any_form_is_off_by_a_share_of_its_largest_effect(study):
     """Where it does least as much as where it does most: the law itself may be elsewhere."""
     change = change_um(study, EDGE)
@@ -96,8 +101,11 @@ def test_errors_of_several_effects_are_independent(study):
     np.testing.assert_allclose(both, sum(each), atol=1e-9 * both.max())
 
 
-def test_where_an_effect_was_switched_off_or_no_paint_lands_its_law_has_no_error():
-    """Edge build needs the voltage; on the back of a plate the model predicts exactly 0."""
+def test_where_an_effect_was_switched_off_or_no_paint_lands_its_law_has_no_error(
+    monkeypatch,
+):
+    """On the back of a plate the model predicts exactly 0."""
+    monkeypatch.setattr(type(EDGE), 'needs', 'voltage')
     off = on_door(switched_off=frozenset(['voltage']))
     doors = study_of(on_door(), replace(off, name='without voltage'))
     plate = study_of(plate_with_a_back())
@@ -198,6 +206,14 @@ def test_an_addition_is_in_micrometres():
     assert best.name in ('exponential', 'saturating')
     assert best.formula.startswith('addition [um] = ')
     assert 'level_um' in best.parameters
+    assert fitting_forms(x, np.zeros(KNOTS), sd, unit='m', addition=True) == ()
+
+
+def test_a_form_about_a_value_below_zero_is_written_with_a_plus():
+    x = np.linspace(-4.0, 2.0, KNOTS)
+    forms = fitting_forms(x, 0.9 + 0.1 * x, np.full(KNOTS, 0.004), unit='1/m')
+    assert any('(x + 1)' in form.formula for form in forms)
+    assert not any('- -' in form.code + form.formula for form in forms)
 
 
 @pytest.mark.parametrize(

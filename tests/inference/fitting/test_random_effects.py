@@ -87,7 +87,7 @@ def test_a_part_without_voltage_has_a_level_of_its_own():
     np.testing.assert_allclose(other, np.where(rows, share, 0.0))
     double = study.residuals(study.measured_um * np.where(rows, 2.0, 1.0))
     np.testing.assert_allclose(double.predicted_um, study.measured_um, rtol=0.02)
-    assert study.has(EFFECTS['edge_build']).tolist() == (~rows).tolist()
+    assert study.has(EFFECTS['convex_attraction']).tolist() == (~rows).tolist()
     assert study.has(EFFECTS['sag']).all()
 
 

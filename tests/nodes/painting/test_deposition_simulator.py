@@ -21,7 +21,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.painting.film_display import ACKNOWLEDGE_TIMEOUT_S
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.topics import header_stamp_ns
-from paint_deposition.part.surface import toward_the_gun
+from paint_deposition.part.surface import toward_the_guns
 
 MOTION = two_passes()
 STREAM = """
@@ -70,7 +70,8 @@ def test_the_gun_decides_which_side_of_a_solid_is_outward(simulator, robot, pain
     moved = centroid_m(node, painted(node)) - centroid_m(still, painted(still))
     assert moved[1] > 0.2 * aside_m
     path, _ = spray_path(motion)
-    offline = toward_the_gun(read_mesh(plate, 1.0, 0.05), path.position_m, path.rotation[:, :, 2])
+    motions = [(path.position_m, path.rotation[:, :, 2])]
+    offline = toward_the_guns(read_mesh(plate, 1.0, 0.05), motions)
     np.testing.assert_array_equal(node.surface.outward, [1.0, 0.0, 0.0])
     np.testing.assert_array_equal(offline.outward, node.surface.outward)
     integrator = FilmIntegrator(offline.points(), model, 'single', offline.occluder)

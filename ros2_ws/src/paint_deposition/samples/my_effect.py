@@ -16,7 +16,7 @@ class WakeLoss(Effect):
 
     loss_per_m_per_s: float = parameter(
         0.0, low=0.0, high=2.0, typical=0.2, unit='1/(m/s)',
-        description='a, share of the flux that a speed of 1 m/s takes; positive takes away',
+        description='a, exponent of the loss at 1 m/s, about the share if small; positive loses',
     )  # fmt: skip
 
     @staticmethod

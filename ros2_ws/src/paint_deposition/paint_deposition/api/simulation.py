@@ -157,7 +157,7 @@ def simulate(
         ModelError: models of several guns that do not go together.
         ReadingsError: readings that are not on the part.
         PaintError: a tolerance that is not less than the target, a zone without a vertex, or names
-            of coats that do not go with the motions or the readings.
+            of guns or coats that do not go with the motions or the readings.
     """
     require_band(target_um, tolerance_um)
     motions = [trajectory] if isinstance(trajectory, Trajectory) else list(trajectory)
@@ -171,6 +171,8 @@ def simulate(
             'them'
         )
     laid = Coats.of_guns(coats, len(motions), coats if wet_on_wet else ())
+    if names and len(names) != len(motions):
+        raise PaintError(f'{len(names)} names for {len(motions)} guns: give one for each, or none')
     if len(motions) > 1:
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         named = list(zip(names, models, strict=True))

@@ -94,7 +94,7 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
         mark = '' if value.determined else '   not determined'
         yield f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
     for planar in result.model.patterns:
-        yield f'SB50 of one pass: {1e3 * sb50_m(planar):.0f} mm'
+        yield f'SB50 of one pass, along tool x: {1e3 * sb50_m(planar):.0f} mm'
     for experiment, found in zip(result.study.campaign.experiments, result.residuals, strict=True):
         yield (
             f'{experiment.name}: {len(found)} points, mean {found.measured_um.mean():.2f} µm '

@@ -85,7 +85,8 @@ class Effect(BaseModel):
       ``max``, and ``kernel.fast_math``: a branch or a function of ``math`` costs the loop its
       speed.
     * ``pattern_scale``: the same, returning the factor s by which the pattern shrinks seen from
-      the emission point: q becomes s q and the flux s^2, so that no volume is lost.
+      the emission point: q becomes s q and the flux s^2, so that no volume is lost. It goes with
+      ``widening``, beyond which the spray is cut off.
     * ``on_film``: the film changes after it has arrived.
     * ``on_gauge``: the gauge reads something else than the film.
 
@@ -128,7 +129,7 @@ class Effect(BaseModel):
         """Return what the gauge shows (V,) [um] on that film."""
         return film_um
 
-    def reach(self) -> float:
+    def widening(self) -> float:
         """How many times wider than the model's pattern the spray can get, at least 1."""
         return 1.0
 

@@ -5,29 +5,19 @@ import hashlib
 import importlib
 import inspect
 import pkgutil
-import re
 import sys
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextvars import ContextVar
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import Any
 
-import numpy as np
-
-from paint_deposition.effects import library
-from paint_deposition.effects.base import Effect, PathContext
+from paint_deposition.effects import library, trial
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap
+from paint_deposition.effects.trial import one_line
 from paint_deposition.errors import ModelError, did_you_mean
-from paint_deposition.kernel.compiler import njit
-from paint_deposition.kernel.laws import Ray, in_precision
-from paint_deposition.model.eq2_projection import Projection
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.part.points import SurfacePoints
 
 # In the order in which people look for causes.
 FAMILIES = (
@@ -80,11 +70,6 @@ def learned_law(covariate: str) -> type[LearnedLaw]:
         f'no learned law has the covariate {covariate!r}; {did_you_mean(covariate, LEARNED)}'
     )
 
-
-LAWS = ('flux_factor', 'pattern_scale')
-PLACES = (*LAWS, 'on_path', 'on_film', 'on_gauge', 'shadow')
-# A ray on which laws are tried out: at the model plane, 0.6 rad off the normal.
-TRIAL_RAY = Ray(*np.array([0.1, -0.05, 1.0, 0.825, 0.5], dtype=np.float32))
 
 # Whether code may run that data name, and not the user: --allow-effects.
 effects_allowed = ContextVar('effects_allowed', default=False)
@@ -152,7 +137,7 @@ def effect_of(path: Path, source: bytes) -> type[Effect]:
         if not classes:
             raise ModelError(f'{path}: has no effect; define one class that derives from Effect')
         (effect,) = classes
-        if problem := _problem_with(effect):
+        if problem := trial.problem_in_words(effect):
             raise ModelError(f'{path}: {effect.__name__} {problem}')
         effect.file, effect.file_content = key[0], source
         _loaded[key] = effect
@@ -171,9 +156,7 @@ def try_effect(effect: type[Effect], path: str | Path) -> None:
     Raises:
         ModelError: it does not compile, fails or gives no usable result; ``path`` names its file.
     """
-    laws = (_problem_with_law(effect, name) for name in LAWS)
-    problem = next(filter(None, laws), None) or _problem_with_places(effect.typical())
-    if problem:
+    if problem := trial.problem_in_use(effect):
         raise ModelError(f'{path}: {effect.__name__} {problem}')
 
 
@@ -193,87 +176,6 @@ def _run(path: Path, source: bytes, digest: str) -> ModuleType:
             lines = [error.lineno]
         line = f', line {lines[-1]}' if lines else ''
         raise ModelError(
-            f'{path}{line}: {type(error).__name__}: {_one_line(error)}; correct the file'
+            f'{path}{line}: {type(error).__name__}: {one_line(error)}; correct the file'
         ) from None
     return module
-
-
-def _one_line(error: BaseException) -> str:
-    """The telling line of a message; compilers begin theirs with how far they came."""
-    text = re.sub(r'\x1b\[[0-9;]*m', '', str(error))
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
-    telling = [line for line in lines if not line.startswith('Failed in ')]
-    return (telling or lines or [type(error).__name__])[0]
-
-
-def _problem_with(effect: type[Effect]) -> str | None:
-    """What is wrong and how to put it right, or None."""
-    for name in ('id', 'family'):
-        value = getattr(effect, name, None)
-        if not isinstance(value, str) or not value:
-            return f"has no {name}; add a line {name} = '...'"
-    if not re.fullmatch('[a-z][a-z0-9_]*', effect.id):
-        return f'has the id {effect.id!r}; use small letters, digits and _'
-    own = [name for name in effect.model_fields if name not in Effect.model_fields]
-    for name, field in ((name, effect.model_fields[name]) for name in own):
-        if not isinstance(field.json_schema_extra, dict) or 'role' not in field.json_schema_extra:
-            return f'declares {name} without parameter(...); give its unit and bounds there'
-    if not effect.amplitudes():
-        return 'has no amplitude; declare one with parameter(0.0, low=..., high=..., typical=...)'
-    for name, described in effect.parameters().items():
-        values = [described['low'], described['neutral'], described['high']]
-        if sorted(values) != values or not values[0] <= described['typical'] <= values[2]:
-            return f'has a neutral or typical {name} outside its bounds; widen them'
-    if effect.typical().is_neutral:
-        return 'is absent at its typical size; make typical differ from neutral'
-    if all(getattr(effect, place) is getattr(Effect, place) for place in PLACES):
-        return f'does nothing; define one of {", ".join(PLACES)}'
-    return None
-
-
-def _problem_with_law(effect: type[Effect], name: str) -> str | None:
-    law = getattr(effect, name)
-    if law is None:
-        return None
-    if not isinstance(inspect.getattr_static(effect, name), staticmethod):
-        return f'defines {name} with self; put @staticmethod before it'
-    wanted = ['ray', *effect.parameters()]
-    if list(inspect.signature(law).parameters)[1:] != wanted[1:]:
-        return f'must define {name}({", ".join(wanted)}): the ray, then all its parameters'
-    values = np.array(effect.typical().values(), dtype=np.float32)
-    try:
-        result = njit(error_model='numpy')(in_precision(law, np.float32))(TRIAL_RAY, *values)
-    except Exception as error:
-        return (
-            f'has a {name} that does not compile ({_one_line(error)}); keep to arithmetic, min, '
-            'max and kernel.fast_math'
-        )
-    if not isinstance(result, float) or not np.isfinite(result) or result < 0.0:
-        return f'has a {name} that gives {result!r} on an ordinary ray; a factor is 0 or more'
-    return None
-
-
-def _problem_with_places(effect: Effect) -> str | None:
-    """Try the effect on a short path and a few points."""
-    square = np.array([[x, 0.0, z] for x in (0.0, 0.1) for z in (0.0, 0.1)])
-    points = SurfacePoints(square, np.tile([0.0, -1.0, 0.0], (4, 1)))
-    context = PathContext(Projection(), points.down, points.outward, points.centre_m)
-    positions_m = np.linspace([0.0, -0.25, 0.05], [0.03, -0.25, 0.05], 4)
-    toward_y = np.tile([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (4, 1))
-    path, _ = spray_path(Trajectory(np.arange(4) * 20_000_000, positions_m, toward_y))
-    trials: dict[str, Callable[[], Any]] = {
-        'on_path': lambda: effect.on_path(path, context),
-        'on_film': lambda: effect.on_film(np.full(4, 20.0), points),
-        'on_gauge': lambda: effect.on_gauge(np.full(4, 20.0), points),
-    }
-    for place, trial in trials.items():
-        try:
-            result = trial()
-        except Exception as error:
-            return f'has an {place} that fails ({type(error).__name__}: {_one_line(error)})'
-        if place == 'on_path':
-            if not isinstance(result, SprayPath) or len(result) != len(path):
-                return 'has an on_path that does not return a path; return path.with_(...)'
-        elif np.shape(result) != (4,) or not np.isfinite(result).all():
-            return f'has an {place} that does not return a finite film; return one value a point'
-    return None

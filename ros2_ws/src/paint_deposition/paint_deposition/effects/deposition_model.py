@@ -65,7 +65,11 @@ class DepositionModel(BaseModel):
         return self.model_copy(update={'planar': new[0], 'brushes': brushes})
 
     def with_brush(self, number: int) -> 'DepositionModel':
-        """A copy that has one of the brushes only, or ModelError; 0 is the only one."""
+        """A copy with the pattern of one brush; number 0 where there is one only.
+
+        Raises:
+            ModelError: the model does not have that brush.
+        """
         if number != ONLY_BRUSH and not self.brushes:
             raise ModelError(
                 f'brush {number} is not in the model: it has one pattern, planar, without a number'
@@ -148,7 +152,7 @@ class DepositionModel(BaseModel):
     @property
     def widening(self) -> float:
         """How many times wider than the planar pattern the effects can make the spray."""
-        return math.prod(effect.reach() for effect in self.effects)
+        return math.prod(effect.widening() for effect in self.effects)
 
     @property
     def reach_m(self) -> float:
@@ -183,6 +187,6 @@ class DepositionModel(BaseModel):
         return self.model_copy(update={'effects': left})
 
     def with_effect(self, effect: Effect) -> 'DepositionModel':
-        """A copy with the effect added, or replaced where one of its id is there."""
-        others = tuple(e for e in self.effects if e.id != effect.id)
-        return self.model_copy(update={'effects': (*others, effect)})
+        """A copy with the effect added at the end, or in the place of the one of its id."""
+        by_id = {e.id: e for e in self.effects} | {effect.id: effect}
+        return self.model_copy(update={'effects': tuple(by_id.values())})

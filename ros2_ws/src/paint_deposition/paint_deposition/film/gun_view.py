@@ -9,14 +9,14 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.points import box_extent_m
+from paint_deposition.part.points import box_extent_m, box_words
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 
 # Poses that stand for the whole path, and rays that stand for the spray of each.
 POSES, RAYS = 240, 160
 # No gun paints from so far away.
-FAR_M = 1.0
+TOO_FAR_TO_PAINT_M = 1.0
 # Part and path that differ so much in size are in different units.
 OTHER_UNIT = 100.0
 # Painters lean the gun, but less than this; an axis within 37 degrees of a direction points there.
@@ -116,8 +116,8 @@ def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
     """Yield what is odd, a line each with its likely cause; what follows from one is left out."""
     sprayed_m = view.whole.position_m[view.whole.flow > 0.0]
     boxes = (
-        f"the poses in frame '{frame_id}' span {_box(sprayed_m)}, the mesh "
-        f'{_box(view.surface.vertices_m)}'
+        f"the poses in frame '{frame_id}' span {box_words(sprayed_m)}, the mesh "
+        f'{box_words(view.surface.vertices_m)}'
     )
     alone = _other_unit(view) or _not_over(view, boxes)
     if alone:
@@ -135,11 +135,6 @@ def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
         yield aside
     elif not aim and len(hitting) < len(view.passes):
         yield _missing(view)
-
-
-def _box(positions_m: np.ndarray) -> str:
-    ends = zip('xyz', positions_m.min(axis=0), positions_m.max(axis=0), strict=True)
-    return ', '.join(f'{axis} {low:.2f} to {high:.2f}' for axis, low, high in ends) + ' m'
 
 
 def _other_unit(view: GunView) -> str:
@@ -161,7 +156,7 @@ def _other_unit(view: GunView) -> str:
             f'the poses look like millimetres: they span {way:.4g} m, the part {part:.3g} m; give '
             '--pose-unit mm, or the poses in metres'
         )
-    if way > 0.0 and part > OTHER_UNIT * way and view.distance_m.min() > FAR_M:
+    if way > 0.0 and part > OTHER_UNIT * way and view.distance_m.min() > TOO_FAR_TO_PAINT_M:
         return (
             f'the mesh looks like millimetres: it spans {part:.3g} m, the poses {way:.3g} m; use '
             '--mesh-scale 0.001, or mesh_scale: 0.001 in a campaign'
@@ -173,7 +168,7 @@ def _not_over(view: GunView, boxes: str) -> str:
     if view.over.any():
         return ''
     nearest = float(view.distance_m.min())
-    if nearest < FAR_M:
+    if nearest < TOO_FAR_TO_PAINT_M:
         return (
             f'the passes miss the part, the gun runs beside it, {nearest:.2f} m away at the '
             f"nearest: {boxes}; check the part's pose and the frame of the poses"
@@ -227,7 +222,7 @@ def _off_model_plane(view: GunView, boxes: str) -> str:
         "from it: check that the TCP is the centre of the bell cup, and the part's pose; if they "
         'are right, calibrate at this standoff'
     )
-    return line if standoff < FAR_M else f'{line}; {boxes}'
+    return line if standoff < TOO_FAR_TO_PAINT_M else f'{line}; {boxes}'
 
 
 def _aside(view: GunView, passes: list[SprayPath]) -> str:

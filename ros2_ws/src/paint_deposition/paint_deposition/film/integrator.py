@@ -13,6 +13,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ModelError
 from paint_deposition.film import layout
 from paint_deposition.film.statistics import PaintUsed
 from paint_deposition.kernel.blocks import LARGEST_BLOCK, shared_among_threads
@@ -201,6 +202,7 @@ class FilmIntegrator:
         """Values (..., V) of the sorted points in the order of the caller's."""
         sorted_back = np.empty(values.shape)
         sorted_back[..., self._blocks.order] = values
+        sorted_back.flags.writeable = False  # one film is read by many
         return sorted_back
 
     @property
@@ -227,16 +229,34 @@ class FilmIntegrator:
 def after_film_effects(
     raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints
 ) -> np.ndarray:
-    """(V,) film that is there in the end [um] where (V,) arrived [um]."""
+    """(V,) film that is there in the end [um] where (V,) arrived [um].
+
+    Raises:
+        ModelError: an effect gives a film that is not finite.
+    """
     for effect in effects:
-        raw_um = effect.on_film(raw_um, points)
+        raw_um = _finite(effect.on_film(raw_um, points), effect, 'film')
     return raw_um
 
 
 def gauge_reading_um(
     film_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints
 ) -> np.ndarray:
-    """(V,) what a gauge shows [um] on a film (V,) [um]."""
+    """(V,) what a gauge shows [um] on a film (V,) [um].
+
+    Raises:
+        ModelError: an effect gives a reading that is not finite.
+    """
     for effect in effects:
-        film_um = effect.on_gauge(film_um, points)
+        film_um = _finite(effect.on_gauge(film_um, points), effect, 'reading')
     return film_um
+
+
+def _finite(values_um: np.ndarray, effect: Effect, what: str) -> np.ndarray:
+    odd = np.flatnonzero(~np.isfinite(values_um))
+    if len(odd):
+        raise ModelError(
+            f'effect {effect.id!r} gives a {what} of {values_um[odd[0]]} µm at {len(odd)} of '
+            f'{len(values_um)} points; correct its law, or take it out of the model'
+        )
+    return values_um

@@ -55,12 +55,18 @@ def collapse_um(
         (N,) film [um].
 
     Raises:
-        PlanError: speed or standoff is not above zero.
+        PlanError: speed or standoff is not above zero, or the plane is behind the emission point.
     """
     standoff = model.projection.nominal_standoff_m if standoff_m is None else standoff_m
     for name, value in (('speed_m_per_s', speed_m_per_s), ('standoff_m', standoff)):
         if not (math.isfinite(value) and value > 0.0):
             raise PlanError(f'{name} is {value:g}; give a number above 0')
+    offset_m, nearest_m = model.projection.emission_offset_m, model.projection.nearest_m
+    if standoff + offset_m <= nearest_m:
+        raise PlanError(
+            f'standoff_m is {standoff:g} and the emission point of the model lies {-offset_m:g} m '
+            f'in front of the TCP: give a standoff above {nearest_m - offset_m:g}'
+        )
     if model.effects:
         way = -1.0 if backwards else 1.0
         roll = travel_rad + (math.pi if turned else 0.0)
@@ -78,9 +84,9 @@ def sampled_collapse(
     At a fineness of 0.25 sigma_n of parallel passes is still good to 1e-5, in a tenth of the time.
     """
     standoff = options.get('standoff_m') or model.projection.nominal_standoff_m
-    widening = max(model.projection.widening(standoff), 1e-6)
-    reach = model.planar.radius_of_flux_m(NEGLIGIBLE) * model.widening * widening
-    finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
+    magnification = max(model.projection.magnification(standoff), 1e-6)
+    reach = model.planar.radius_of_flux_m(NEGLIGIBLE) * model.widening * magnification
+    finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * magnification
     count = round(fineness * min(max(math.ceil(2.0 * reach / finest * 16.0), 257), 4097))
     x = np.linspace(-reach, reach, count | 1)
     # Where the asymmetry f turns over, at the centre, samples close in by halves.
@@ -103,9 +109,9 @@ def pass_film_um(
     ``velocity_m_per_s`` is negative backwards, ``roll_rad`` the direction of travel in the tool.
     """
     # Middles and lengths of sub-steps, even in u with distance = FINEST_STEP_M sinh(u).
-    widening = model.projection.widening(standoff_m)
-    far = 1.5 * model.reach_m * widening
-    finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
+    magnification = model.projection.magnification(standoff_m)
+    far = 1.5 * model.reach_m * magnification
+    finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * magnification
     u_far = math.asinh(far / FINEST_STEP_M)
     half = math.ceil(u_far * fineness * 5.0 * far / finest)
     u, step = np.linspace(-u_far, u_far, 2 * half, retstep=True)

@@ -34,7 +34,8 @@ LARGEST_BLOCK = 256
 SMALLEST_BLOCK = 32
 # Points that a SIMD loop takes at once.
 LANES = 16
-# Threads take runs of blocks; neighbours lie this far apart, for work where the gun is shared.
+# A thread takes a run of blocks, of which each is so many further over the part than the last:
+# all threads have some under the gun.
 SPREAD = 8
 
 

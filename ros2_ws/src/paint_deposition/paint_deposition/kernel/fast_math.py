@@ -19,12 +19,15 @@ WITHOUT_REORDERING = {'fastmath': {'contract'}}
 
 
 def exp2(x):
-    """2**x; below -120 (single) or -1000 (double) the result stays at that floor."""
+    """2**x up to 127 (single) or 1023 (double), beyond which the result is nonsense.
+
+    Below -120 or -1000 it stays at that floor.
+    """
     return 2.0**x
 
 
 def exp(x):
-    """e**x; below -83 (single) or -693 (double) the result stays at that floor."""
+    """e**x; below -83 or above 87 (single), -693 or 709 (double) the result stays as there."""
     return math.exp(x)
 
 
@@ -35,7 +38,7 @@ def log(x):
 
 @register_jitable
 def power(x, exponent):
-    """A positive, normal number to any power."""
+    """A positive, normal number to any power; the result stays within the limits of ``exp``."""
     return exp(exponent * log(x))
 
 
@@ -52,8 +55,10 @@ def _exp2(x):
 def _exp(x):
     if x not in (types.float32, types.float64):
         return None
-    log2_e = (np.float32 if x == types.float32 else np.float64)(math.log2(math.e))
-    return lambda x: exp2(x * log2_e)
+    real, ceiling = (np.float32, 126.0) if x == types.float32 else (np.float64, 1023.0)
+    log2_e, highest = real(math.log2(math.e)), real(ceiling)
+    # Not in exp2, whose argument in the hot loop is never large: it would cost some per cent.
+    return lambda x: exp2(min(x * log2_e, highest))
 
 
 def _exp2_terms(degree: int) -> list[float]:

@@ -1,9 +1,10 @@
 """Eq. (2) of Conner et al. (IROS 2002): the planar model projected onto any surface.
 
-    flux(s) = (Omega / l)^2 <e, n> / <e, z>^3 d(q),    q = Omega (s - p) / <s - p, z>
+    D(s, p) = (Omega / L)^2 <e, n> / <e, z>^3 d(q),    q = Omega (s - o) / <s - o, z>
 
-with the emission point p, the unit vector e from it to the surface point s at a distance l, the
-bell's axis z and the surface normal n, turned against e. ``kernel/eq2_flux.py`` sums it.
+with the pose p, its emission point o, the unit vector e from it to the surface point s at a
+distance L, the bell's axis z and the surface normal n, which points into the part.
+``kernel/eq2_flux.py`` sums it.
 """
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -29,7 +30,7 @@ class Projection(BaseModel):
         """Distance of the TCP from the part at which the part lies on the model plane [m]."""
         return self.model_plane_m - self.emission_offset_m
 
-    def widening(self, standoff_m: float) -> float:
+    def magnification(self, standoff_m: float) -> float:
         """How many times wider the pattern is at a standoff [m] than on the model plane."""
         return (standoff_m + self.emission_offset_m) / self.model_plane_m
 

@@ -128,7 +128,7 @@ def half_width_m(collapse: Collapse) -> float:
 
 
 def sb50_m(planar: PlanarPattern) -> float:
-    """SB50 of a pass along tool y on the model plane [m]."""
+    """SB50 on the model plane of a pass along tool y, so that its width lies along tool x [m]."""
     reach_m = planar.radius_of_flux_m(1e-4)
     across_m = np.linspace(-reach_m, reach_m, 801)
     film_um = line_integral_um_m_per_s(planar, across_m)

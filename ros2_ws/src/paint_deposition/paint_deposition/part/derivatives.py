@@ -12,8 +12,8 @@ from paint_deposition.part.creases import RIM_FOLD_RAD
 from paint_deposition.part.edges import near_pairs, rows_by_number
 from paint_deposition.part.refinement import face_areas_m2, face_normals
 
-# Of the fit's equations, by the Frobenius norm.
-TERMS = 5
+# Of a parabola through a point: two slopes and three second derivatives.
+UNKNOWNS = 5
 
 
 def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -93,7 +93,7 @@ def _equations(vertices, v, normal, near, system):
         offset = difference(vertices[w], vertices[v])
         farthest2 = max(farthest2, dot(offset, offset))
     size = math.sqrt(farthest2)
-    terms = np.empty(TERMS + 1)
+    terms = np.empty(UNKNOWNS + 1)
     system[:] = 0.0
     for w in near:
         away = difference(vertices[w], vertices[v])
@@ -104,11 +104,11 @@ def _equations(vertices, v, normal, near, system):
         terms[5] = dot(normal, offset)
         # Near vertices shape the parabola by far the most.
         weight = math.exp(-12.0 * dot(offset, offset))
-        for i in range(TERMS):
+        for i in range(UNKNOWNS):
             share = weight * terms[i]
-            for j in range(i, TERMS + 1):
+            for j in range(i, UNKNOWNS + 1):
                 system[i, j] += share * terms[j]
-    for i in range(TERMS):
+    for i in range(UNKNOWNS):
         for j in range(i):
             system[i, j] = system[j, i]
     return first, second
@@ -118,33 +118,33 @@ def _equations(vertices, v, normal, near, system):
 def _solved(system, work):
     """Slopes along both axes, and the condition of the equations (Gauss and Jordan)."""
     size2 = 0.0
-    for i in range(TERMS):
-        for j in range(TERMS):
+    for i in range(UNKNOWNS):
+        for j in range(UNKNOWNS):
             size2 += system[i, j] * system[i, j]
-            work[i, TERMS + 1 + j] = 1.0 if i == j else 0.0
-    work[:, : TERMS + 1] = system
-    for k in range(TERMS):
+            work[i, UNKNOWNS + 1 + j] = 1.0 if i == j else 0.0
+    work[:, : UNKNOWNS + 1] = system
+    for k in range(UNKNOWNS):
         pivot = k
-        for i in range(k + 1, TERMS):
+        for i in range(k + 1, UNKNOWNS):
             if abs(work[i, k]) > abs(work[pivot, k]):
                 pivot = i
         if work[pivot, k] == 0.0:
             return 0.0, 0.0, np.inf
-        for j in range(2 * TERMS + 1):
+        for j in range(2 * UNKNOWNS + 1):
             work[k, j], work[pivot, j] = work[pivot, j], work[k, j]
         scale = 1.0 / work[k, k]
-        for j in range(2 * TERMS + 1):
+        for j in range(2 * UNKNOWNS + 1):
             work[k, j] *= scale
-        for i in range(TERMS):
+        for i in range(UNKNOWNS):
             if i != k:
                 share = work[i, k]
-                for j in range(2 * TERMS + 1):
+                for j in range(2 * UNKNOWNS + 1):
                     work[i, j] -= share * work[k, j]
     inverse2 = 0.0
-    for i in range(TERMS):
-        for j in range(TERMS):
-            inverse2 += work[i, TERMS + 1 + j] ** 2
-    return work[0, TERMS], work[1, TERMS], math.sqrt(size2 * inverse2)
+    for i in range(UNKNOWNS):
+        for j in range(UNKNOWNS):
+            inverse2 += work[i, UNKNOWNS + 1 + j] ** 2
+    return work[0, UNKNOWNS], work[1, UNKNOWNS], math.sqrt(size2 * inverse2)
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
@@ -153,7 +153,7 @@ def _fill(vertices, faces, first, corner, start, stop, normals):
     """Set the normals of vertices from start to stop."""
     seen = np.zeros(len(vertices), dtype=np.int32)
     passed, near = np.zeros_like(seen), np.empty_like(seen)
-    system, work = np.empty((TERMS, TERMS + 1)), np.empty((TERMS, 2 * TERMS + 1))
+    system, work = np.empty((UNKNOWNS, UNKNOWNS + 1)), np.empty((UNKNOWNS, 2 * UNKNOWNS + 1))
     for v in range(start, stop):
         normal = normals[v]
         _mean_normal(vertices, faces, corner[first[v] : first[v + 1]], normal)

@@ -265,11 +265,6 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
     return surface
 
 
-def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Surface:
-    """Turn a part as ``toward_the_guns`` does, for one gun."""
-    return toward_the_guns(surface, [(positions_m, z_axes)])
-
-
 def turned(surface: Surface) -> Surface:
     """The part with its other side outward."""
     return replace(

@@ -117,7 +117,7 @@ CLEARANCE_M = 5e-4
 LIFT_M = 1e-4
 AZIMUTHS, ELEVATIONS = 32, 8
 SKY_RAYS = AZIMUTHS * ELEVATIONS
-FAR_M = 1e3
+BEYOND_THE_PART_M = 1e3
 
 
 class Occluder:
@@ -194,7 +194,7 @@ class Occluder:
             point, ray = np.nonzero(sky[2] <= horizon[part, None])
             direction = np.einsum('kr,kri->ri', sky[:, ray], frame[:, point])
             starts = points_m[part][point] + LIFT_M * up[point]
-            blocked = self._blocked(starts, direction, np.full(len(starts), FAR_M))
+            blocked = self._blocked(starts, direction, np.full(len(starts), BEYOND_THE_PART_M))
             hidden = np.bincount(point, blocked * weights[ray], minlength=len(up))
             open_share[part] = 1.0 - hidden
         return open_share

@@ -181,11 +181,11 @@ def plan(
 def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) -> PassStyle:
     overspray = request.overspray_m
     if overspray is None:
-        widening = model.projection.widening(plane.standoff_m)
+        magnification = model.projection.magnification(plane.standoff_m)
         radii = np.linspace(0.0, model.planar.radius_of_flux_m(1e-6), 500)
         enclosed = model.planar.enclosed_fraction(radii)
         # The gun opens where 90 % of the pattern's volume begin to reach the part.
-        overspray = widening * float(np.interp(0.9, enclosed, radii))
+        overspray = magnification * float(np.interp(0.9, enclosed, radii))
     return PassStyle(
         standoff_m=plane.standoff_m,
         speed_m_per_s=plane.speed_m_per_s,

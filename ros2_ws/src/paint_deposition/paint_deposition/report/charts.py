@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.curves import LearnedCurve, counted_from_1
 from paint_deposition.effects.learned.law import (
     LEAST_FACTOR,
     LearnedFootprint,
@@ -19,7 +19,6 @@ from paint_deposition.report.data import ReportData
 from paint_deposition.report.style import ACCENT, BEFORE, GRID, INK, MUTED, TWO_SIDED_95
 from paint_deposition.report.words import (
     capital,
-    counted_from_1,
     covariate_label,
     effect_name,
     fixed,
@@ -121,8 +120,8 @@ def _of_each_model(data: ReportData, *values: Iterable[np.ndarray]) -> Iterator[
 
 def covariate_figure(data: ReportData) -> dict[str, Any] | None:
     """Residual against what differs from point to point, the most telling first."""
-    values = {c.name: c.values for c in data.study.covariates(data.models[0])}
-    values['spray_pass'] = values['spray_pass'] + 1.0  # as on the part
+    covariates = data.study.covariates(data.models[0])
+    values = {c.name: counted_from_1(c.name, c.values) for c in covariates}
     # Conditions that differ by less say nothing of the model.
     differing = {n for n, v in values.items() if np.ptp(v) > 0.01 * np.abs(v).max()}
     dependences = [d for d in data.comparisons[0].dependences if d.covariate in differing]
@@ -173,8 +172,10 @@ def learned_figure(data: ReportData) -> dict[str, Any] | None:
         around = np.linspace(law.low - step, law.high + step, 201)
         with np.errstate(invalid='ignore', divide='ignore'):  # a distance to an edge has an end
             around = around[np.isfinite(law.axis(around))]
-        title, x = capital(effect_name(law.id)), counted_from_1(law, values)
-        traces = [_line(counted_from_1(law, around), curve(around), ACCENT, 2.5, **hover)]
+        title, x = capital(effect_name(law.id)), counted_from_1(law.covariate, values)
+        traces = [
+            _line(counted_from_1(law.covariate, around), curve(around), ACCENT, 2.5, **hover)
+        ]
         if law.sd:
             half = TWO_SIDED_95 * law.deviation(values)
             low = np.maximum(curve(values) - half, LEAST_FACTOR if factor else -np.inf)

@@ -10,7 +10,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.curves import LearnedCurve, counted_from_1
 from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap
 from paint_deposition.film.common_film import sum_um
 from paint_deposition.film.integrator import FilmIntegrator
@@ -276,7 +276,7 @@ def law_rows(data: ReportData) -> list[dict[str, str]]:
             row |= {'kind': 'curve', 'ends': ends, 'unit': unit}
             if law.sd:  # where the band of the curve is narrow, and where it is wide
                 at = np.linspace(law.low, law.high, 101)
-                half, shown = TWO_SIDED_95 * law.deviation(at), words.counted_from_1(law, at)
+                half, shown = TWO_SIDED_95 * law.deviation(at), counted_from_1(law.covariate, at)
                 of_half = ' µm' if law.kind == 'addition' else ''
                 best, least = (
                     f'± {words.number(half[k], 2)}{of_half} at {words.number(shown[k])} '

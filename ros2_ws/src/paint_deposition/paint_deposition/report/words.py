@@ -2,13 +2,12 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import LEARNED
-from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.curves import LearnedCurve, counted_from_1
 from paint_deposition.effects.learned.law import (
     LEAST_FACTOR,
     LearnedFootprint,
@@ -106,7 +105,7 @@ def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
     shown = ('addition', 'µm') if law.kind == 'addition' else ('factor', '')
     words = [(shown[0], f'{least} to {most}', shown[1])]
     if isinstance(law, LearnedCurve):
-        low, high = (number(counted_from_1(law, end)) for end in (law.low, law.high))
+        low, high = (number(counted_from_1(law.covariate, end)) for end in (law.low, law.high))
         words.append(('over', f'{low} to {high}', unit_words(law.unit)))
     elif isinstance(law, LearnedMap):
         for grid in law.maps:
@@ -115,11 +114,6 @@ def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
     elif isinstance(law, LearnedFootprint):
         words.append(('out to', number(1e3 * law.reach_m), 'mm from the axis on the model plane'))
     return words
-
-
-def counted_from_1(law: LearnedCurve, values: Any) -> Any:
-    """Values of a curve's covariate as they are shown: passes count from 1."""
-    return values + (1.0 if law.covariate == 'spray_pass' else 0.0)
 
 
 def law_lines(law: Effect | None) -> list[str]:

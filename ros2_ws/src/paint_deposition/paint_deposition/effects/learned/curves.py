@@ -126,6 +126,11 @@ def knot_positions(
     return np.where(np.isfinite(position), position, -2.0)
 
 
+def counted_from_1(covariate: str, values: Any) -> Any:
+    """Values of a covariate as people count them: passes from 1."""
+    return values + (1.0 if covariate == 'spray_pass' else 0.0)
+
+
 def along_path(path: SprayPath) -> dict[str, np.ndarray]:
     """Covariates (M,) of the sub-steps of a path; NaN where one is not known.
 

@@ -9,10 +9,11 @@ class AirDrift(Effect):
     """Slow drops are advected by the booth's air, and sink.
 
     Acts on the motion: the pattern is shifted on the model plane by the drift's components in the
-    tool's x and y. On the part the shift is a L / Omega, as drops that fly further drift longer:
-    at the model plane's distance Omega it is a. Its direction is fixed in the booth, however the
-    gun is turned. ``shift_down_m``: along gravity, and never up, as drops sink and booths blow
-    down; positive ``shift_across_m``: horizontally, to the right as the gun sees the part.
+    tool's x and y. On the part the shift is a Z / Omega, Z the distance along the bell's axis, as
+    drops that fly further drift longer: at the model plane's distance Omega it is a. Its
+    direction is fixed in the booth, however the gun is turned. ``shift_down_m``: along gravity,
+    and never up, as drops sink and booths blow down; positive ``shift_across_m``: horizontally,
+    to the right as the gun sees the part.
     """
 
     id = 'air_drift'

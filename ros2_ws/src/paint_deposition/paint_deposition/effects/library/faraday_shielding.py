@@ -28,7 +28,8 @@ class FaradayShielding(Effect):
 
     shielding: float = parameter(
         0.0, low=0.0, high=2.0, typical=0.15, unit='1',
-        description='a, share lost where the radius is 250 mm; positive takes away',
+        description='a, exponent of the loss where the radius is 250 mm: about the share lost, if '
+        'small; positive takes away',
     )  # fmt: skip
 
     def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Flow that drifts from pass to pass."""
 
+import numpy as np
+
 from paint_deposition.effects.base import Effect, PathContext, SprayPath, parameter
 
 # The calibrated flow is that of the middle of a job; live nobody knows how many passes will come.
@@ -10,7 +12,8 @@ class FlowDrift(Effect):
     """Pump, temperature and viscosity drift: each pass delivers a little more, or less.
 
     Acts on the flow: times (1 + a)^(n - 2.5) on pass n, the first pass being 0, so that the middle
-    of six passes is as calibrated. Positive a: later passes deliver more.
+    of six passes is as calibrated. Positive a: later passes deliver more. A pass by itself, as
+    ``recommend`` computes it, has no number and is as calibrated.
     """
 
     id = 'flow_drift'
@@ -30,5 +33,6 @@ class FlowDrift(Effect):
     )  # fmt: skip
 
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
-        growth = (1.0 + self.drift_per_pass) ** (path.passes_before - MIDDLE_PASS)
+        number = np.where(np.isnan(path.time_s), MIDDLE_PASS, path.passes_before)
+        growth = (1.0 + self.drift_per_pass) ** (number - MIDDLE_PASS)
         return path.with_flow_scaled(growth)

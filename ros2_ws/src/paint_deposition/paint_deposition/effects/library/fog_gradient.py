@@ -9,7 +9,8 @@ class FogGradient(Effect):
     """Fog sinks along the part and settles on its way: most at the bottom.
 
     Acts on the film: plus a (1 - height), height running from 0 at the lowest point of the part
-    to 1 at its highest. Only ever adds, whatever the film; none on a part not yet sprayed.
+    to 1 at its highest. Only ever adds, whatever the film; none as long as no paint has landed on
+    any of the points at hand.
     """
 
     id = 'fog_gradient'

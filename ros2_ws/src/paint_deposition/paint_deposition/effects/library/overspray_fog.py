@@ -8,8 +8,8 @@ from paint_deposition.effects.base import Effect, SurfacePoints, parameter
 class OversprayFog(Effect):
     """Fine drops miss the part, stay in the booth and settle on everything in it.
 
-    Acts on the film: plus a, everywhere, also where no gun looked. Only ever adds; none on a part
-    not yet sprayed.
+    Acts on the film: plus a, everywhere, also where no gun looked. Only ever adds; none as long as
+    no paint has landed on any of the points at hand.
     """
 
     id = 'overspray_fog'

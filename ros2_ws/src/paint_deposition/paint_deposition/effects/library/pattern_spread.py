@@ -10,8 +10,9 @@ STANDOFF_RANGE = 4.0
 class PatternSpread(Effect):
     """The spray is no bundle of straight rays from one point: air and field bend it.
 
-    The width grows as (L / Omega)^(1 + a) instead of L / Omega: a point q of the model plane
-    becomes q (L / Omega)^-a, and the flux (L / Omega)^-2a times as much, which keeps the volume.
+    The width grows as (Z / Omega)^(1 + a) instead of Z / Omega, Z the distance along the bell's
+    axis from the emission point: a point q of the model plane becomes q (Z / Omega)^-a, and the
+    flux (Z / Omega)^-2a times as much, which keeps the volume.
     Positive a: the pattern is wider than the straight cone beyond the model plane (the field and
     the drops' own charge drive it apart); negative a: narrower (shaping air holds it together).
     """
@@ -35,5 +36,5 @@ class PatternSpread(Effect):
     def pattern_scale(ray: Ray, exponent: float) -> float:
         return power(ray.standoff_ratio, -exponent)
 
-    def reach(self) -> float:
+    def widening(self) -> float:
         return STANDOFF_RANGE ** abs(self.exponent)

@@ -13,8 +13,10 @@ class Sag(Effect):
     Gravity drives a flux rho g h^3 / (3 eta) down the wet film until it has set. Acts on the
     film: T - d/ds [run T (T / 20 um)^2], s down the surface. ``run_m`` is how far a film of 20 um
     as a whole runs before it sets; the cube makes a film twice as thick run four times as far.
-    Thick zones lose at their top and gain below; the volume stays, but for what runs over the
-    lower edge. Of first order: the run must be short against the film's features.
+    Thick zones lose at their top and gain below. On a plane the volume stays, but for what runs
+    over the lower edge; on a cylinder it grows by some 0.4 %, as the law leaves out that paint
+    slows down where the surface grows less steep. Of first order: the run must be short against
+    the film's features, or the film falls below zero.
     """
 
     id = 'sag'

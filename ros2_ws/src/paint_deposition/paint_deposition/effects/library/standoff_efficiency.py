@@ -7,7 +7,7 @@ from paint_deposition.kernel.fast_math import power
 class StandoffEfficiency(Effect):
     """Drops that fly further lose momentum, evaporate and feel a weaker field: fewer arrive.
 
-    Flux along each ray times (L / Omega)^-a, L the distance along the bell's axis and Omega that
+    Flux along each ray times (Z / Omega)^-a, Z the distance along the bell's axis and Omega that
     of the model plane, where nothing changes. Positive a: the far surface gets less.
     """
 

@@ -15,7 +15,7 @@ class TcpStandoff(Effect):
     exact = True
     covariates = ('standoff_ratio',)
     signature = 'as if the whole path were sprayed from another distance'
-    rivals = ('pattern_spread', 'standoff_efficiency')
+    rivals = ('pattern_spread', 'standoff_efficiency', 'part_misalignment')
     source = 'error of tool calibration; size from general practice'
 
     offset_z_m: float = parameter(

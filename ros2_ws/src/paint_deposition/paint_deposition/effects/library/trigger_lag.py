@@ -19,7 +19,7 @@ class TriggerLag(Effect):
     family = 'boundary'
     covariates = ('since_trigger_s',)
     signature = 'less paint where the gun opens and more where it closes, on alternate sides'
-    rivals = ('corner_slowdown', 'pose_lag')
+    rivals = ('corner_slowdown', 'pose_lag', 'gun_wake')
     source = (
         'delay of gun on and off is a set-up parameter of painting robots; tests of its timing: '
         'Mossige, Gotlieb and Meling (IJCAI 2016); first-order form and size from general practice'

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.curves import LearnedCurve, counted_from_1
 
 # So many knots count at least, where they are off alike: one more than a form's parameters.
 LEAST_KNOTS = 5
@@ -129,7 +129,7 @@ def variable_at(law: LearnedCurve, value: np.ndarray) -> np.ndarray:
     """The variable at values of a law's covariate (...); passes count from 1."""
     if law.covariate == 'incidence_deg':
         return np.cos(np.radians(value))
-    return value + (1.0 if law.covariate == 'spray_pass' else 0.0)
+    return counted_from_1(law.covariate, value)
 
 
 def at_knots(law: LearnedCurve) -> np.ndarray:
@@ -165,9 +165,9 @@ def fitting_forms(
         addition: whether the values are added to the film.
 
     Returns:
-        None where nothing of few parameters fits, or where a constant does as well.
+        None where nothing of few parameters fits, or where a constant or nothing does as well.
     """
-    if len(x) < LEAST_KNOTS:
+    if len(x) < LEAST_KNOTS or not value.any():
         return ()
     sd = np.maximum(sd, 1e-9)
     fits = [fit for form in FORMS for fit in _fitted(form, x, value, sd, unit, addition)]
@@ -264,6 +264,7 @@ def _code(form: str, x: np.ndarray, unit: str, addition: bool) -> str:
         text = f'{names[0]} + {text}' if addition else f'{names[0]} * (1.0 + {text})'
     for idle, plain in IDLE.items():
         text = text.replace(idle, plain)
+    text = text.replace('- -', '+ ')
     return text or f'{names[0]} + 0.0 * x'
 
 

@@ -38,7 +38,7 @@ MAP_STEP_M, RADII = 0.06, 10
 # Angles at which a pattern is averaged.
 ANGLES = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 # Distance of knots that have nothing in common.
-FAR = 1e6
+APART = 1e6
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> lis
         for k, place_m in places.items():
             change[owner == k] = grid.weights(place_m)
         # Parts have nothing in common.
-        knots.append(np.column_stack([grid.knots_m(), np.full(grid.knots, FAR * len(grids))]))
+        knots.append(np.column_stack([grid.knots_m(), np.full(grid.knots, APART * len(grids))]))
         changes.append(change * film_um[:, np.newaxis] if kind == 'factor' else change)
         grids.append(grid)
     chosen = [[k] for k in range(len(grids))] + [list(range(len(grids)))] * (len(grids) > 1)
@@ -232,7 +232,7 @@ def footprint_basis(study: Study, model: DepositionModel, radii: int = RADII) ->
         films.append(np.stack([hat_sums(rays.share * wave, radius, radii) for wave in angle]))
     film_um = np.concatenate(films, axis=1)  # WAVES, P, radii
     radius, wave = np.indices((radii, WAVES))
-    places = np.column_stack([radius.ravel(), FAR * wave.ravel()]).astype(float)
+    places = np.column_stack([radius.ravel(), APART * wave.ravel()]).astype(float)
     change = film_um.transpose(1, 2, 0).reshape(film_um.shape[1], -1)
     return Basis(LearnedFootprint, {'reach_m': float(reach)}, change, places, 1.0)
 

@@ -81,7 +81,7 @@ class Forward:
     def _split_by_stage(self, model: DepositionModel) -> '_Stages':
         acting = tuple(effect for effect in model.effects if not effect.is_neutral)
         # What effects change before the film has arrived must be integrated again.
-        early = ('on_path', 'reach', 'shadow', *LAWS)
+        early = ('on_path', 'widening', 'shadow', *LAWS)
         before = tuple(effect for effect in acting if effect.acts(*early))
         if any(effect.acts(*LAWS) for effect in before):
             # All laws in a fixed order, absent ones neutral: one kernel, beside that without laws.
@@ -164,7 +164,9 @@ class _Part:
             integrator.reset()
             integrator.paint(steps)
             arrived.append(integrator.raw_um[: len(self.points(slope))])
-        return np.concatenate(arrived)
+        film_um = np.concatenate(arrived)
+        film_um.flags.writeable = False  # the next model reads it, too
+        return film_um
 
     def _ready(self, model: DepositionModel, slope: bool) -> tuple[FilmIntegrator, list[Steps]]:
         integrator = self._integrators.get(slope)

@@ -51,7 +51,7 @@ class Rays:
         distance = np.linalg.norm(to_point, axis=2)
         facing = -np.einsum('mpi,pi->mp', to_point, points.normals)
         along = local[:, :, 2]
-        lit = (along > max(offset, 1e-3)) & (facing > 0.0)
+        lit = (along > model.projection.nearest_m) & (facing > 0.0)
         depth = np.where(lit, along, 1.0)
         x, y = (omega * local[:, :, k] / depth for k in (0, 1))
         flux = np.empty(x.shape)

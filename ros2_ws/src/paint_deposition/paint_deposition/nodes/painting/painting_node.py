@@ -27,7 +27,7 @@ from paint_deposition.nodes.painting.painting_parameters import (
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.node import Task
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface, facing, toward_the_gun
+from paint_deposition.part.surface import Surface, facing, toward_the_guns
 
 MODEL_PARAMETERS = {'model_file', 'model_files'}
 
@@ -342,7 +342,7 @@ class PaintingNode(ManagedNode, ABC):
             if pointing:
                 if decided:
                     self._guns_to_orient = [g for g in self._guns_to_orient if g < number]
-                return toward_the_gun(self.surface, positions, axes)
+                return toward_the_guns(self.surface, [(positions, axes)])
         return self.surface
 
     def _adopt(self, repainting: Repainting) -> None:

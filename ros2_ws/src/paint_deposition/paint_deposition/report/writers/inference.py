@@ -257,7 +257,9 @@ def _bounds(found: Parameter) -> str:
     if found.role == 'shape':
         role, low, high = "role='shape'", value / ROOM, value * ROOM
     else:
-        away = ROOM * max(abs(value - neutral), 0.1 if neutral else 1e-3)
-        role, low, high = f'typical={value}', neutral - away, neutral + away
+        least = 0.1 if neutral else 1e-3
+        away = ROOM * max(abs(value - neutral), least)
+        typical = value if value != neutral else neutral + least
+        role, low, high = f'typical={typical}', neutral - away, neutral + away
         low = max(low, 0.0) if found.role == 'level' else low
     return f'{neutral}, low={low:.4g}, high={high:.4g}, {role}'
