@@ -4,7 +4,6 @@ import ast
 import io
 import os
 import shlex
-import signal
 import subprocess
 import sys
 import time
@@ -106,30 +105,6 @@ def test_every_example_is_taken_and_begins_with_samples_or_results(name, monkeyp
 def test_a_command_that_is_none_is_refused_with_the_nearest():
     assert_refused(paint('simulat'), "no command is called 'simulat'", "did you mean 'simulate'?")
     assert_refused(paint('xyz'), 'there are: demo, simulate, ')
-
-
-@pytest.mark.slow
-def test_an_interrupted_command_leaves_nothing_and_says_so(tmp_path, wait_until):
-    (tmp_path / 'wait.py').write_text(
-        'from pathlib import Path\nfrom time import sleep\n'
-        'Path(__file__).with_name("reached").touch()\nsleep(60)\n'
-    )
-    (tmp_path / 'model.yaml').write_text('effects: [{file: wait.py}]\n')
-    process = subprocess.Popen(
-        ['paint', 'simulate', '--mesh', SAMPLES / 'door.stl',
-         '--trajectory', SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
-         '--model', tmp_path / 'model.yaml', '-o', tmp_path / 'out'],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        # A shell starts what runs in its background deaf to interrupts, and so are its children.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )  # fmt: skip
-    wait_until((tmp_path / 'reached').exists, what='the model')
-    process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert output == ''
-    assert errors.splitlines()[-1] == 'paint: interrupted'
-    assert not (tmp_path / 'out').exists()
 
 
 def test_no_option_takes_a_number_that_is_none():
