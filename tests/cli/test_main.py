@@ -6,7 +6,6 @@ import os
 import shlex
 import subprocess
 import sys
-import time
 from contextlib import redirect_stderr
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from cli.command import assert_refused, paint
 from paint_deposition.cli.main import COMMANDS
 from paint_deposition.cli.main import paint as group
 from paint_deposition.cli.results import Progress
+from waiting import until
 
 
 @pytest.mark.parametrize('arguments', [[], ['-h']])
@@ -127,9 +127,7 @@ class Terminal(io.StringIO):
 
 def shown(terminal: Terminal, count: int) -> list[str]:
     """What the line said once it was drawn this often, without another word from the work."""
-    deadline = time.monotonic() + 60.0
-    while terminal.getvalue().count('\r') < count and time.monotonic() < deadline:
-        time.sleep(0.01)
+    until(lambda: terminal.getvalue().count('\r') >= count, f'line {count}')
     return [line.strip() for line in terminal.getvalue().split('\r') if line.strip()]
 
 
