@@ -334,6 +334,7 @@ def test_labels_of_listed_points_are_no_statistics(file):
         ('point;DFT\n1;20\n;21\n2;22\n', {}, 'line 3: the point has no label'),
         ('point,DFT\n1,20\npoint,DFT,Units\n2,1,mil\n', {}, 'lines 1 and 3 are headings of two'),
         ('Punkt;Nassschichtdicke\n1;45\n', {}, "thickness .columns: 'Punkt', 'Nassschichtdicke'"),
+        ('no;DFT soll;Dicke Lack\n1;2;3\n', {}, "thickness .columns: 'no', 'DFT soll', 'Dicke"),
         ('point,DFT\n1,20,5\n2,21,5\n', {}, 'with decimal commas, put semicolons between the col'),
         ('point;DFT [mm]\n1;24\n', {}, 'is 24000; .* it may be in another unit than is said'),
         ('point;DFT\n1;24 µm\n2;1 mil\n', {}, "DFT is '24 µm'; .* write the one unit in the hea"),
