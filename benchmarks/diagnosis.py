@@ -27,21 +27,20 @@ for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
     os.environ.setdefault(threads, '1')
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / 'tests')]
 
 from benchmarks.records import add, kept  # noqa: E402
 from benchmarks.scores import failures, reliability_diagram, table  # noqa: E402
+from benchmarks.worlds.measured import available  # noqa: E402
+from benchmarks.worlds.record import KINDS, Painted  # noqa: E402
 
 import paint_deposition as paint  # noqa: E402
 from paint_deposition.inference.diagnosis.discrepancy import PRIOR  # noqa: E402
 from paint_deposition.inference.fitting.forward import Forward  # noqa: E402
 from paint_deposition.inference.readings.campaign import Campaign  # noqa: E402
-from worlds.measured import available  # noqa: E402
-from worlds.record import KINDS, Painted  # noqa: E402
 
 WORLDS = {
-    'droplets': 'worlds.droplets',
-    'semi_real': 'worlds.semi_real',
+    'droplets': 'benchmarks.worlds.droplets',
+    'semi_real': 'benchmarks.worlds.semi_real',
 }
 PAINTED = ROOT / 'runs' / 'bench-diagnosis'
 # A reading this many times as far off as usual has a typing error; eight standard deviations.

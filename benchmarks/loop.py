@@ -14,11 +14,11 @@ from pathlib import Path
 
 import click
 import numpy as np
+from benchmarks.programme import Evenness, Painted, driven
 from benchmarks.records import add, kept, results_option
 from tests.virtual_paint_shop.draw import draw_jobs, stream
 from tests.virtual_paint_shop.files import write
 from tests.virtual_paint_shop.gauge import GaugeNoise, scatter
-from tests.virtual_paint_shop.programme import Evenness, Painted, driven
 from tests.virtual_paint_shop.shop import Campaign, generate
 from tests.virtual_paint_shop.truths import choose
 

@@ -14,10 +14,10 @@ import trimesh
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.programme import Evenness, Painted, driven
 from tests.virtual_paint_shop.draw import draw_jobs, stream
 from tests.virtual_paint_shop.files import write
 from tests.virtual_paint_shop.gauge import GaugeNoise, scatter
-from tests.virtual_paint_shop.programme import Evenness, Painted, driven
 from tests.virtual_paint_shop.shop import generate
 from tests.virtual_paint_shop.truths import choose
 

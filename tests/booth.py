@@ -14,6 +14,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.part.points import SurfacePoints
 from scenes import stamps_ns
+from surfaces import on_grid
 
 SAMPLES = Path(__file__).resolve().parent.parent / 'ros2_ws/src/paint_deposition/samples'
 # Tool x along the world's x, tool y down, tool z along +y, into the surface.
@@ -28,10 +29,7 @@ def _square(half_m: float, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
     # An even number: eq. (1) has no one value at the very centre, so no vertex is to lie there.
     line = np.linspace(-half_m, half_m, 2 * round(half_m / spacing_m))
     x, z = np.meshgrid(line, line, indexing='ij')
-    vertices = np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
-    corner = np.arange(x.size).reshape(x.shape)[:-1, :-1].ravel()
-    a, b, c, d = corner, corner + len(line), corner + len(line) + 1, corner + 1
-    return vertices, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return on_grid(np.stack([x, 0.0 * x, z], axis=2))
 
 
 @cache

@@ -4,7 +4,6 @@ import asyncio
 import json
 import shutil
 import subprocess
-import time
 from base64 import b64decode
 from pathlib import Path
 from typing import Any
@@ -12,13 +11,14 @@ from urllib.request import Request, urlopen
 
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
+from waiting import until
+
 CHROMIUM = shutil.which('chromium') or shutil.which('google-chrome')
 # A machine without a graphics card draws in software.
 OPTIONS = (
     '--headless', '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
     '--remote-debugging-port=0', '--no-first-run', '--mute-audio',
 )  # fmt: skip
-PATIENCE_S = 60.0
 
 
 class Tab:
@@ -60,10 +60,7 @@ class Tab:
 
     def wait_until(self, condition: str) -> None:
         """Wait until an expression in the page holds."""
-        deadline = time.monotonic() + PATIENCE_S
-        while not self.evaluate(f'Boolean({condition})'):
-            assert time.monotonic() < deadline, f'{condition} did not hold'
-            time.sleep(0.02)
+        until(lambda: self.evaluate(f'Boolean({condition})'), condition)
 
     def picture(self, path: Path) -> Path:
         """What the page looks like, as PNG."""
@@ -82,10 +79,7 @@ class Chromium:
         quiet = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL}
         self._process = subprocess.Popen(command, **quiet)
         told = folder / 'DevToolsActivePort'
-        deadline = time.monotonic() + PATIENCE_S
-        while not (told.exists() and told.read_text().strip()):
-            assert time.monotonic() < deadline, 'Chromium did not start'
-            time.sleep(0.02)
+        until(lambda: told.exists() and told.read_text().strip(), 'Chromium')
         self.address = f'http://127.0.0.1:{told.read_text().split()[0]}'
 
     def tab(self, url: str, width: int = 1440, height: int = 900) -> Tab:

@@ -19,7 +19,7 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
 # The wheel comes early: meanwhile the first worker compiles what all others find on the disk.
 LONGEST = (
-    'worlds', 'test_packaging.py', 'cli', 'nature', 'inference', 'nodes', 'batch',
+    'bench', 'test_packaging.py', 'cli', 'nature', 'inference', 'nodes', 'batch',
     'test_public.py', 'report', 'planning', 'effects',
 )  # fmt: skip
 

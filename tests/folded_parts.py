@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from paint_deposition.part.surface import Surface
+from surfaces import on_grid
 
 Profile = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
@@ -49,10 +50,4 @@ def _steps(length_m: float, spacing_m: float) -> np.ndarray:
 
 
 def _surface(grid_m: np.ndarray) -> Surface:
-    rows, columns = grid_m.shape[:2]
-    corner = (np.arange(rows - 1)[:, np.newaxis] * columns + np.arange(columns - 1)).ravel()
-    faces = np.concatenate([
-        np.stack([corner, corner + columns, corner + 1], axis=1),
-        np.stack([corner + 1, corner + columns, corner + columns + 1], axis=1),
-    ])  # fmt: skip
-    return Surface.from_triangles(grid_m.reshape(-1, 3), faces, 1.0)
+    return Surface.from_triangles(*on_grid(grid_m), 1.0)

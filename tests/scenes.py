@@ -60,11 +60,6 @@ def lying_plane(half_m: float = 0.6, count: int = 41) -> SurfacePoints:
     )  # fmt: skip
 
 
-def rotation_matrix(quaternion=LOOKING_DOWN) -> np.ndarray:
-    """Tool axes as columns."""
-    return Rotation.from_quat(quaternion).as_matrix()
-
-
 def painted(
     points: SurfacePoints, motion: Trajectory | SprayPath, model=None, precision='single'
 ) -> FilmIntegrator:

@@ -13,6 +13,17 @@ from paint_deposition.part.surface import Surface
 Depth = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
+def on_grid(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces over a grid of points (I, J, 3).
+
+    They are wound from the first index to the second: over x and z outward to -y.
+    """
+    corner = np.arange(points_m[..., 0].size).reshape(points_m.shape[:2])
+    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
+    faces = [np.stack(three, axis=2).reshape(-1, 3) for three in ((a, b, c), (a, c, d))]
+    return points_m.reshape(-1, 3), np.concatenate(faces)
+
+
 def triangulated(
     depth: Depth,
     spacing_m: float,
@@ -45,6 +56,13 @@ def refined(depth: Depth, spacing_m: float, max_edge_length_m: float = 0.01, **s
     return Surface.from_triangles(*triangulated(depth, spacing_m, **shape), max_edge_length_m)
 
 
+def sheet(depth: Depth, half_m: float = 0.5, count: int = 41) -> Surface:
+    """The surface y = depth(x, z) over a square, outward to -y, on a grid of so many lines."""
+    line = np.linspace(-half_m, half_m, count)
+    x, z = np.meshgrid(line, line, indexing='ij')
+    return Surface.from_triangles(*on_grid(np.stack([x, depth(x, z), z], axis=2)), 0.05)
+
+
 def flat(x: np.ndarray, z: np.ndarray) -> np.ndarray:
     """A plane."""
     return np.zeros_like(x)
@@ -66,16 +84,11 @@ def fold(lean_rad: float) -> Depth:
 
 
 def solid(
-    vertices_m: np.ndarray, faces: np.ndarray, thickness_m: float, drawn_along: str = 'normals'
+    vertices_m: np.ndarray, faces: np.ndarray, thickness_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Close a sheet whose outward side is -y: an inner surface behind it, and a rim.
-
-    ``drawn_along`` says where the inner surface lies: along the sheet's 'normals', or along 'y'.
-    """
-    inward = np.tile([0.0, 1.0, 0.0], (len(vertices_m), 1))
-    if drawn_along == 'normals':
-        inward = -trimesh.Trimesh(vertices_m, faces, process=False).vertex_normals
-    inner = vertices_m + thickness_m * inward
+    """Close a sheet: an inner surface behind it, along its normals, and a rim."""
+    outward = trimesh.Trimesh(vertices_m, faces, process=False).vertex_normals
+    inner = vertices_m - thickness_m * outward
     count = len(vertices_m)
     edges = Edges.of(faces).single
     start, end = faces.ravel()[edges], np.roll(faces, -1, axis=1).ravel()[edges]
@@ -90,7 +103,7 @@ def solid(
 def hemmed(
     vertices_m: np.ndarray, faces: np.ndarray, thickness_m: float, facets: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Close a sheet of ``triangulated`` as ``solid`` along y does, but with a round rim.
+    """Close a sheet of ``triangulated`` with an inner surface behind it in y and a round rim.
 
     The round is a half circle as wide as the sheet is thick, cut into so many facets.
     """

@@ -236,7 +236,6 @@ def test_what_makes_no_sense_is_refused(told, words):
         ('grid: {index_m: {first: 1}}', 'first: A, last: B, steps: N'),
         ('sample: {vary: {}}', "has no 'sample.count'; give how many draws"),
         ('sample: {count: 2, vary: {index_m: {normal: [1, -1]}}}', 'standard deviation'),
-        ('grid: {index_m: [0.1]}\ngrid: {}', 'grid'),
         ('[]', 'is not a sweep'),
     ],
 )

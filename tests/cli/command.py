@@ -20,6 +20,7 @@ from cli.outputs import ANY, OUTPUTS
 from paint_deposition.cli.main import run
 from paint_deposition.motion.trajectory import Trajectory
 from scenes import straight_pass
+from surfaces import on_grid
 
 TRIGGER = ('--state-topic', '/atomizer/state')
 COARSE = ('--max-edge-length-m', 0.05)
@@ -85,9 +86,5 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 def sheet(x: np.ndarray, y: np.ndarray, z: np.ndarray, path):
     """Write a sheet over a grid (I, J) of points that looks to -y."""
-    corner = np.arange(x.size).reshape(x.shape)[:-1, :-1].ravel()
-    a, b, c, d = corner, corner + x.shape[1], corner + x.shape[1] + 1, corner + 1
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    vertices = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
-    trimesh.Trimesh(vertices, faces, process=False).export(path)
+    trimesh.Trimesh(*on_grid(np.stack([x, y, z], axis=2)), process=False).export(path)
     return path

@@ -4,10 +4,8 @@ import ast
 import io
 import os
 import shlex
-import signal
 import subprocess
 import sys
-import time
 from contextlib import redirect_stderr
 from pathlib import Path
 
@@ -19,6 +17,7 @@ from cli.command import assert_refused, paint
 from paint_deposition.cli.main import COMMANDS
 from paint_deposition.cli.main import paint as group
 from paint_deposition.cli.results import Progress
+from waiting import until
 
 
 @pytest.mark.parametrize('arguments', [[], ['-h']])
@@ -108,30 +107,6 @@ def test_a_command_that_is_none_is_refused_with_the_nearest():
     assert_refused(paint('xyz'), 'there are: demo, simulate, ')
 
 
-@pytest.mark.slow
-def test_an_interrupted_command_leaves_nothing_and_says_so(tmp_path, wait_until):
-    (tmp_path / 'wait.py').write_text(
-        'from pathlib import Path\nfrom time import sleep\n'
-        'Path(__file__).with_name("reached").touch()\nsleep(60)\n'
-    )
-    (tmp_path / 'model.yaml').write_text('effects: [{file: wait.py}]\n')
-    process = subprocess.Popen(
-        ['paint', 'simulate', '--mesh', SAMPLES / 'door.stl',
-         '--trajectory', SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
-         '--model', tmp_path / 'model.yaml', '-o', tmp_path / 'out'],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        # A shell starts what runs in its background deaf to interrupts, and so are its children.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )  # fmt: skip
-    wait_until((tmp_path / 'reached').exists, what='the model')
-    process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert output == ''
-    assert errors.splitlines()[-1] == 'paint: interrupted'
-    assert not (tmp_path / 'out').exists()
-
-
 def test_no_option_takes_a_number_that_is_none():
     context = click.Context(group)
     numbers = 0
@@ -152,9 +127,7 @@ class Terminal(io.StringIO):
 
 def shown(terminal: Terminal, count: int) -> list[str]:
     """What the line said once it was drawn this often, without another word from the work."""
-    deadline = time.monotonic() + 60.0
-    while terminal.getvalue().count('\r') < count and time.monotonic() < deadline:
-        time.sleep(0.01)
+    until(lambda: terminal.getvalue().count('\r') >= count, f'line {count}')
     return [line.strip() for line in terminal.getvalue().split('\r') if line.strip()]
 
 

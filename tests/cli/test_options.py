@@ -9,7 +9,6 @@ from click.testing import CliRunner
 
 from paint_deposition.cli.main import paint
 from paint_deposition.cli.options import options_of
-from paint_deposition.errors import PlanError
 from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request, given, takes
 
 
@@ -48,34 +47,6 @@ def test_help_shows_text_default_and_bounds():
     assert '--speed FLOAT RANGE Of the passes [m/s]. [default: 0.3; 0.0<x<=3.0]' in text
     assert '--outward X Y Z' in text
     assert '--direction [level|upright]' in text
-
-
-@pytest.mark.parametrize(
-    ('words', 'said'),
-    [
-        (('--speed', 0), '--speed'),
-        (('--speed', 'nan'), 'nan is not finite'),
-        (('--lean-deg', 50), '--lean-deg'),
-        (('--outward', 1, 2), '--outward'),
-    ],
-)
-def test_what_is_out_of_bounds_is_refused_by_the_name_of_its_option(words, said):
-    done = run(*words)
-    assert done.exit_code == 2
-    assert said in done.output
-
-
-@pytest.mark.parametrize(
-    ('values', 'said'),
-    [
-        ({'speed_m_per_s': -1.0}, 'speed_m_per_s is -1; expected a number above 0'),
-        ({'direction': 'up'}, "direction is 'up'; expected 'level' or 'upright'"),
-        ({'speed': 0.4}, "unknown key 'speed'; did you mean 'speed_m_per_s'"),
-    ],
-)
-def test_a_script_is_refused_by_the_name_of_the_field(values, said):
-    with pytest.raises(PlanError, match=said):
-        Coat(**values)
 
 
 def test_a_verb_shows_the_fields_of_its_request():

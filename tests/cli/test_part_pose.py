@@ -1,5 +1,7 @@
 """Where the part stands before the robot: from every source that says so, and `paint locate`."""
 
+import json
+
 import numpy as np
 import pytest
 import yaml
@@ -47,7 +49,8 @@ def test_the_pose_of_the_part_brings_poses_to_it(panel, tmp_path):
         (bag, '--part-pose', ' '.join(map(str, PART_POSE))),
     ):
         out = tmp_path / f'out{len(films)}'
-        done = ran('simulate', '--mesh', panel, '--trajectory', run, *COARSE, *more, '-o', out)
+        given = ('--mesh', panel, '--trajectory', run, *COARSE, *more, '--json', '-o', out)
+        done = ran('simulate', *given)
         films.append(film_in(out))
     assert films[0].max() > 5.0
     assert np.allclose(films[1], films[0], atol=2e-3)
@@ -56,6 +59,8 @@ def test_the_pose_of_the_part_brings_poses_to_it(panel, tmp_path):
         "note: part_pose: poses brought from 'base_link' to the part, which "
     )
     assert 'stands at 2.1 -0.4 0.9 ' in done.stderr
+    (note,) = json.loads(done.stdout)['notes']
+    assert done.stderr == f'note: {note}\n'
 
 
 def test_poses_of_another_frame_are_warned_of_with_both_names(tmp_path):

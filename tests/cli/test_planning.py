@@ -74,8 +74,6 @@ def test_every_option_of_a_recommendation_which_has_a_folder_by_default(model_fi
     [
         ((), 'neither --speed nor --target-um'),
         (('--speed', -1), "'--speed': -1.0 is not in the range"),
-        (('--speed', 'nan'), 'nan is not finite'),
-        (('--speed', 0.2, '--travel-deg', 'inf'), 'inf is not finite'),
         (('--speed', 0.2, '--tolerance', 1e-6), 'the closest is'),
         (('--speed', 0.2, '--tolerance', 5), 'wanted: Largest sigma_n accepted, 0.05 for 5 %'),
         (('--speed', 0.2, '--model', 'nowhere.yaml'), 'nowhere.yaml: no such file'),
@@ -138,7 +136,6 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
         (('--mesh', 'door.stl', '--speed', 0.3, '--standoff', 250), '<=10.0, in metres'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 'nan', 0), 'nan is not finite'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 0, 0), 'give a direction'),
-        (('--mesh', 'door.stl', '--speed', 0.3, '--down', 'nan', 0, 0), 'nan is not finite'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--tip', 'tool0'), '--tip goes with a robot'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--face-angle-deg', 30), 'give --faces auto'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--time-weight', 0), 'is for --optimise'),

@@ -112,13 +112,6 @@ def test_a_point_read_in_two_layers_is_not_measured_again(tmp_path):
     assert (figures['points'], figures['repeated']) == (3, ['2, base'])
 
 
-@pytest.mark.parametrize('heading', ['Auftrag', 'Schichtdicke soll [µm]', 'Schichtdicke Lack'])
-def test_readings_without_a_known_thickness_are_told_the_headings_that_are(heading, tmp_path):
-    (tmp_path / 'door.csv').write_text(f'x_m;y_m;z_m;{heading}\n0;0;0;20,5\n1;0;0;21,5\n')
-    known = f"'{heading}'", 'thickness_um, DFT, film thickness or Schichtdicke'
-    assert_refused(paint('inspect', 'door.csv', cwd=tmp_path), 'no column is known as', *known)
-
-
 def test_a_table_with_every_sample_twice_says_the_rate_without_them(tmp_path):
     rows = [f'{0.004 * k:.3f},{0.01 * (k // 2):.2f},0,0,0,0,0,1' for k in range(200)]
     (tmp_path / 'poses.csv').write_text('\n'.join(['time_s,x_m,y_m,z_m,qx,qy,qz,qw', *rows]))

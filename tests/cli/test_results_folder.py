@@ -55,13 +55,15 @@ def test_what_is_interrupted_leaves_the_folder_as_it_was(tmp_path, error):
     assert (tmp_path / 'out/film.csv').read_text() == 'film.csv'
 
 
-def test_a_folder_that_no_command_made_is_not_replaced(tmp_path):
-    (tmp_path / 'out/trajectory').mkdir(parents=True)
-    (tmp_path / 'out/trajectory/mine.csv').write_text('mine')
-    with pytest.raises(PaintError, match=r'mine\.csv was not written by paint; move it away'):
-        write(tmp_path / 'out', 'trajectory/bag.mcap', 'plan.json')
-    assert names_in(tmp_path / 'out') == ['trajectory']
-    assert names_in(tmp_path / 'out/trajectory') == ['mine.csv']
+@pytest.mark.parametrize('name', ['model.yaml', 'trajectory/mine.csv'])
+def test_files_and_folders_of_the_users_own_are_not_replaced(tmp_path, name):
+    mine = tmp_path / name
+    mine.parent.mkdir(exist_ok=True)
+    mine.write_text('mine')
+    with pytest.raises(PaintError, match=f'{mine.name} was not written by paint; move it away'):
+        write(tmp_path, 'trajectory/bag.mcap', 'model.yaml', 'plan.json')
+    assert [path for path in tmp_path.rglob('*') if path.is_file()] == [mine]
+    assert mine.read_text() == 'mine'
 
 
 @pytest.mark.parametrize(
@@ -95,14 +97,6 @@ def test_what_a_marker_names_is_no_leave_for_a_folder_or_a_link(tmp_path, name):
     else:
         write(tmp_path / 'out', 'model.yaml')
     assert (tree / 'readings.csv').read_text() == 'mine'
-
-
-def test_a_file_of_the_users_own_is_not_overwritten(tmp_path):
-    (tmp_path / 'model.yaml').write_text('# by hand')
-    with pytest.raises(PaintError, match=r'model\.yaml was not written by paint; move it away'):
-        write(tmp_path, 'model.yaml', 'calibration.json')
-    assert names_in(tmp_path) == ['model.yaml']
-    assert (tmp_path / 'model.yaml').read_text() == '# by hand'
 
 
 # Ends at the given call of those that change the folder, or raises there.
@@ -181,18 +175,18 @@ for _ in range(40):
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_a_signal_ends_a_command_like_an_interrupt_and_nothing_is_left(tmp_path, number):
     code = """
-import signal, sys, time
+import signal, sys
 from pathlib import Path
 from paint_deposition.cli import main
 from paint_deposition.cli.results import results_in
 # As at a terminal: a shell ignores it for what it runs in the background.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-def work(**given):
+def work(context):
     with results_in(Path(sys.argv[1])) as folder:
         (folder / 'half').touch()
         print('writing', flush=True)
-        time.sleep(60)
-main.paint.main = work
+        signal.pause()
+main.paint.invoke = work
 main.main()
 """
     words = [sys.executable, '-c', code, str(tmp_path / 'out')]
@@ -200,7 +194,7 @@ main.main()
     running.stdout.readline()
     running.send_signal(number)
     _, errors = running.communicate()
-    assert (running.returncode, errors) == (130, 'paint: interrupted\n')
+    assert (running.returncode, errors) == (130, '\npaint: interrupted\n')
     assert names_in(tmp_path) == []
 
 

@@ -12,7 +12,6 @@ from booth import SAMPLES
 from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint, ran, rows_of
 from paint_deposition.cli.results import MARKER
 from paint_deposition.effects.library.gauge_gain import GaugeGain
-from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
@@ -114,19 +113,6 @@ def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel):
     assert np.array_equal(read.film_um, plain.film_um)
 
 
-def test_a_trigger_that_is_not_named_is_noted(panel, tmp_path):
-    log = level_pass(trigger_stamps_ns=level_pass().stamps_ns[:1], trigger_flow=np.array([1.0]))
-    bag = write_pose_bag(tmp_path / 'pass', log)
-    done = paint(
-        'simulate', '--mesh', panel, '--trajectory', bag, *COARSE, '--json',
-        '-o', tmp_path / 'out',
-    )  # fmt: skip
-    (line,) = done.stderr.splitlines()
-    assert line.startswith(f'note: recording {bag}: /atomizer/state (std_msgs/msg/Bool) is not')
-    assert '--state-topic' in line
-    assert line == f'note: {json.loads(done.stdout)["notes"][0]}'
-
-
 def refused(tmp_path, *arguments):
     """What `paint simulate` says; nothing may have been written."""
     done = paint('simulate', *arguments, '-o', tmp_path / 'out')
@@ -148,7 +134,6 @@ def refused(tmp_path, *arguments):
         ('--tolerance-um', '3', ['--target-um']),
         ('--tolerance-um', ('60', '--target-um', '45'), ['bare metal would be within it']),
         ('--down', ('0', '0', '0'), ['down', 'give the direction of gravity']),
-        ('--target-um', 'nan', ['--target-um', 'nan is not finite']),
     ],
 )
 def test_bad_input_is_refused(option, value, words, panel, one_pass, tmp_path):

@@ -161,6 +161,14 @@ def test_film_on_surface_of_250_mm_radius(name, values, convex_um, flat_um, conc
     assert found == pytest.approx([convex_um, flat_um, concave_um])
 
 
+def test_a_gauge_reads_its_gain_more_and_its_zero_higher_also_on_bare_metal():
+    film_um, points = np.array([0.0, 10.0, 40.0]), panel().points()
+    read = EFFECTS['gauge_zero'](offset_um=0.8).on_gauge(film_um, points)
+    np.testing.assert_array_equal(read, film_um + 0.8)
+    read = EFFECTS['gauge_gain'](gain=0.02).on_gauge(film_um, points)
+    np.testing.assert_array_equal(read, 1.02 * film_um)
+
+
 def test_fog_adds_exactly_and_only_to_a_part_that_was_sprayed():
     path = path_of(spot())
     plain = painted(panel(), path).film_um

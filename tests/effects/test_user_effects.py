@@ -15,7 +15,7 @@ from numba import njit
 import paint_deposition as pd
 from booth import SAMPLES, painted, panel, path_of, serpentine
 from paint_deposition.effects.base import Effect, PathContext, SprayPath
-from paint_deposition.effects.catalogue import EFFECTS, effect_class, load_effect_file
+from paint_deposition.effects.catalogue import load_effect_file
 from paint_deposition.effects.trial import NEEDS, PLACES, TRIAL_RAYS
 from paint_deposition.errors import ModelError
 from paint_deposition.kernel.laws import Ray, in_precision
@@ -187,19 +187,6 @@ def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
         *NEEDS[1:],
     ):
         assert f'`{name}`' in text or f"`'{name}'`" in text or f"'{name}'`" in text
-
-
-def test_a_missing_file_is_named(tmp_path: Path):
-    with pytest.raises(ModelError, match=r'nothing\.py: cannot be read \(No such file'):
-        load_effect_file(tmp_path / 'nothing.py')
-
-
-def test_an_unknown_id_is_answered_with_the_nearest():
-    assert effect_class('air_drift') is EFFECTS['air_drift']
-    with pytest.raises(ModelError, match=r"'air_drfit'; did you mean 'air_drift'\?"):
-        effect_class('air_drfit')
-    with pytest.raises(ModelError, match='there are: incidence_attraction, '):
-        effect_class('???')
 
 
 def test_a_class_of_a_script_has_no_file_that_a_model_could_name(own, tmp_path):

@@ -129,16 +129,13 @@ def test_two_experiments_need_two_names(campaign):
     ('text', 'message'),
     [
         (None, 'no such file; give a campaign YAML'),
-        (b'PK\x03\x04\x9c\xff', 'is no text, such as a workbook or a bag; give a campaign YAML'),
-        ('experiments: [', 'cannot be read as YAML .*line'),
-        ('experiments: []\nexperiments: []', 'line 2: found duplicate key "experiments"'),
         ('just words', 'campaign is text; expected the keys experiments, '),
     ],
 )
 def test_a_file_that_is_no_campaign_is_refused(tmp_path, text, message):
     path = tmp_path / 'campaign.yaml'
     if text is not None:
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        path.write_text(text)
     with pytest.raises(pd.PaintError, match=message) as refused:
         pd.read_campaign(path)
     assert '\n' not in str(refused.value)

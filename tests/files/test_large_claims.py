@@ -50,13 +50,6 @@ def _mcap_chunk() -> bytes:
     return magic + header + chunk + b'\x02' + struct.pack('<QQQI', 20, 0, 0, 0) + magic
 
 
-def _far_cell() -> bytes:
-    cell = b'<c r="XFD1048576">'
-    sheet = targets()['worksheet']
-    far = b'<row r="1048576">' + cell + b'<v>1</v></c></row></sheetData>'
-    return sheet.around(sheet.seeds[0].replace(b'</sheetData>', far))
-
-
 def _doubled(around: bytes) -> bytes:
     """Thirty lists of YAML, each with the one before it ten times."""
     lines = [b'a0: &a0 {k0: 1}' if b'<<' in around else b'a0: &a0 [1]']
@@ -132,7 +125,6 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'triangles of an STL': ('stl', lambda: bytes(80) + struct.pack('<I', CLAIMED) + bytes(50)),
     'a chunk of a glTF': ('glb', lambda: struct.pack('<4s4I', b'glTF', 2, 20, 4 * CLAIMED, J)),
     'a zstd chunk to recover': ('mcap_recovery', _mcap_chunk),
-    'a cell of a workbook': ('workbook', _far_cell),
     'lists of YAML': ('model', lambda: b'name: ' + b'[' * 100_000),
     'nested YAML': ('model', lambda: b'- ' * 100_000),
     'aliases of YAML': ('model', lambda: _doubled(b'[%s]')),
@@ -160,6 +152,11 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
         lambda: _main(b'FOR i FROM 1 TO 9998 DO FOR j FROM 1 TO 9998 DO ENDFOR ENDFOR'),
     ),
     'calls of RAPID': ('rapid', _calls),
+    'nested arrays of RAPID': (
+        'rapid',
+        lambda: RAPID.replace(b'[[0,0,0]', b'[' * 20_000 + b'[0,0,0]'),
+    ),
+    'links of a URDF': ('urdf', lambda: b'<robot name="a">' + b'<link name="x">' * 20_000),
     'an array of RAPID': ('rapid', lambda: RAPID.replace(b'n{2}:=', b'n{1000000000}:=[[')),
 }
 
@@ -188,26 +185,6 @@ def test_what_a_head_claims_is_not_believed(what, tmp_path, little_memory):
     while error is not None:
         assert not isinstance(error, MemoryError), f'{what}: memory was asked for'
         error = error.__cause__ or error.__context__
-
-
-NESTED = {
-    'arrays of RAPID': ('rapid', lambda: RAPID.replace(b'[[0,0,0]', b'[' * 20_000 + b'[0,0,0]')),
-    'lists of a model': ('model', lambda: b'effects: ' + b'[' * 4_000),
-    'lists of a campaign': ('campaign', lambda: b'experiments: ' + b'[' * 4_000),
-    'links of a URDF': ('urdf', lambda: b'<robot name="a">' + b'<link name="x">' * 20_000),
-}  # fmt: skip
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('what', NESTED)
-def test_what_is_nested_without_end_is_refused_in_a_line(what, tmp_path):
-    name, content = NESTED[what]
-    target = targets()[name]
-    path = tmp_path / f'nested{target.suffix}'
-    path.write_bytes(content())
-    with pytest.raises(PaintError) as refused:
-        target.read(path)
-    assert '\n' not in str(refused.value)
 
 
 def test_a_recording_that_was_compressed_as_a_whole_is_not_expanded_beyond_measure(

@@ -20,6 +20,7 @@ from paint_deposition.film.layout import SIGHT_STEP_M, emission_points_m, term_w
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
+from patterns import PATTERNS
 from scenes import lying_plane, stamps_ns, straight_pass, weaving
 
 MODEL = pd.DepositionModel()
@@ -154,13 +155,6 @@ def test_moving_part_and_gun_together_changes_nothing():
     assert largest_error(single, still) < 2e-6
 
 
-PATTERNS = {
-    'default': PlanarPattern(),
-    'ring only': PlanarPattern(K2=0.0, K3=0.9),
-    'centre only': PlanarPattern(K2=1.0),
-    'spot': PlanarPattern(r_m=0.0, K2=0.5, sigma1_m=0.03, sigma2_m=0.02),
-    'thin ring': PlanarPattern(r_m=0.3, sigma1_m=0.02, K3=0.5, phi_rad=-2.0),
-}
 CASES = [*((planar, ()) for planar in PATTERNS.values()), (PlanarPattern(), ('pattern_spread',))]
 # Of the film's peak: what lies beyond the reach of one or the other.
 CUT = 3e-6

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from paint_deposition.kernel.compiler import KINDS, kinds_at_hand, njit
-from paint_deposition.kernel.laws import Ray, in_precision
 
 # Writes a film to the standard output.
 FILM = """
@@ -50,22 +49,3 @@ def test_a_users_own_functions_are_compiled_for_the_processor_at_hand():
     assert kinds[1] in KINDS
     assert numba.config.CPU_NAME is None
     assert kinds[0] not in KINDS
-
-
-@numba.njit
-def _doubled(x):
-    return 2.0 * x
-
-
-@numba.njit(fastmath=True)
-def _half(x):
-    return 0.25 * _doubled(x)
-
-
-def test_a_law_may_call_what_its_author_compiled():
-    def law(ray, amplitude):
-        return 1.0 + amplitude * _half(ray.cos_incidence)
-
-    compiled = njit(in_precision(law, np.float32))
-    ray = Ray(*np.array([0.0, 0.0, 1.0, 0.8, 0.5], np.float32))
-    assert compiled(ray, np.float32(0.5)) == pytest.approx(1.2)

@@ -14,14 +14,15 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import NEAREST_M, Projection
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
-from scenes import rotation_matrix
+from scenes import LOOKING_DOWN
 
 PLANAR = PlanarPattern()
 # Within 33 degrees of the axis to 1e-9.
 NARROW = PlanarPattern(K1_cm3_per_s=1.3, K3=0.5, r_m=0.04, sigma1_m=0.025, sigma2_m=0.03)
 PROJECTION = Projection(model_plane_m=0.30, emission_offset_m=0.05)
 OMEGA = PROJECTION.model_plane_m
-DOWN = rotation_matrix()  # tool z along -z, tool x along x, tool y along -y
+# Tool z along -z, tool x along x, tool y along -y.
+DOWN = Rotation.from_quat(LOOKING_DOWN).as_matrix()
 STANDOFFS_M = [0.15, 0.25, 0.4]
 
 
@@ -80,6 +81,15 @@ def plane(tilt_rad):
     return positions, normals, weight * t
 
 
+def cylinder(radius_m):
+    """Disc laid on a level cylinder along y, which bulges to the gun or, negative, is hollow."""
+    t, angle, weight = disc(1.0)
+    turn = t * np.cos(angle) / radius_m
+    normals = np.stack([np.sin(turn), 0.0 * turn, np.cos(turn)], axis=1)
+    along = np.outer(t * np.sin(angle), [0.0, 1.0, 0.0])
+    return radius_m * (normals - [0.0, 0.0, 1.0]) + along, normals, weight * t
+
+
 def sphere(radius_m, standoff_m):
     """Cap of a sphere as far as it is seen from the emission point."""
     seen = math.acos(radius_m / (radius_m + standoff_m + PROJECTION.emission_offset_m))
@@ -92,6 +102,14 @@ def sphere(radius_m, standoff_m):
 @pytest.mark.parametrize('tilt_deg', [0, 15, -30, 45])
 def test_a_plane_however_tilted_takes_all(standoff_m, tilt_deg):
     positions, normals, area = plane(math.radians(tilt_deg))
+    got = flux(positions, normals, [0, 0, standoff_m], planar=NARROW)
+    assert area @ got == pytest.approx(NARROW.K1_cm3_per_s, rel=2e-5)
+
+
+@pytest.mark.parametrize('standoff_m', STANDOFFS_M)
+@pytest.mark.parametrize('radius_m', [1.0, -1.0])
+def test_a_cylinder_wider_than_the_spray_takes_all(standoff_m, radius_m):
+    positions, normals, area = cylinder(radius_m)
     got = flux(positions, normals, [0, 0, standoff_m], planar=NARROW)
     assert area @ got == pytest.approx(NARROW.K1_cm3_per_s, rel=2e-5)
 

@@ -19,7 +19,7 @@ from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.topics import TRUST_TOPIC
+from paint_deposition.nodes.runtime.topics import TRUST_TOPIC, header
 
 SIMULATOR = 'deposition_simulator'
 PLAYER = 'bag_player'
@@ -172,10 +172,12 @@ def test_a_film_is_in_doubt_while_its_recorder_is_stalled(
         # One that has not heard the robot yet is not behind it.
         silent = source.create_publisher(PoseProgress, 'atomizer/progress', topics.PROGRESS)
         wait_until(lambda: silent.get_subscription_count() == 2)
+        behind = header('', int(MOTION.stamps_ns[99]) - 3_000_000_000)
+        silent.publish(PoseProgress(header=behind, reporter='/robot'))
+        wait_until(lambda: says(b'\x01', '/robot is 3 s behind'))
         silent.publish(PoseProgress(reporter='/robot'))
-        wait_until(lambda: ('', '/robot') in node.trust._reports)
-        node.trust.publish()
-        assert says(b'\x00', 'all that was sent')
+        wait_until(lambda: says(b'\x00', 'all that was sent'))
+        source.destroy_publisher(silent)
     source.send(MOTION, slice(100, 102), frame_id='nowhere')
     wait_until(lambda: says(b'\x01', '2 poses refused'))
     node.reset()

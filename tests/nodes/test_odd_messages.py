@@ -2,6 +2,7 @@
 
 import os
 import random
+import time
 
 import numpy as np
 import pytest
@@ -62,7 +63,7 @@ def made(nodes, closed):
     ['simulator', 'comparison', 'web_view', 'recorder', 'joints', 'tf', 'trigger', 'player'],
 )
 def test_no_message_of_the_right_type_ends_a_node(
-    name, made, ros_context, spin, executor, wait_until, still
+    name, made, ros_context, spin, executor, wait_until
 ):
     if name == 'tf':
         pytest.importorskip('tf2_msgs')
@@ -85,7 +86,14 @@ def test_no_message_of_the_right_type_ends_a_node(
         peer.send([node, *others], rng)
         for _ in range(10):
             executor.spin_once(timeout_sec=0.0)
-    still(1.5)  # diagnostics, statistics and all other timers
+    sent_ns = time.monotonic_ns()
+    wait_until(
+        lambda: all(
+            timer.is_canceled() or timer.time_since_last_call() < time.monotonic_ns() - sent_ns
+            for timer in node.timers
+        ),
+        what='diagnostics, statistics and all other timers',
+    )
     for _ in range(3):  # what timers and services show of it
         node.publish_diagnostics()
     assert not node.finished.done(), node.finished.exception()

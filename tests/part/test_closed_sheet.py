@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, toward_the_guns
-from surfaces import hemmed, solid, triangulated
+from surfaces import hemmed, on_grid, solid, triangulated
 
 pytestmark = pytest.mark.slow
 
@@ -26,7 +26,7 @@ def door_depth(x, z):
 
 
 @cache
-def parts(side: str, thickness_m: float, drawn_along: str = 'normals') -> tuple[Surface, Surface]:
+def parts(side: str, thickness_m: float) -> tuple[Surface, Surface]:
     """The outer surface alone and the solid, both seen by the gun; see ``solid``."""
     open_sheet = triangulated(door_depth, 0.015, 0.5 * WIDTH_M, 0.5 * HEIGHT_M, jitter=0.2)
     turn = Rotation.from_euler('z', SIDES[side], degrees=True)
@@ -34,7 +34,7 @@ def parts(side: str, thickness_m: float, drawn_along: str = 'normals') -> tuple[
     x, z = (w.ravel() for w in np.meshgrid([-0.4, -0.2, 0.0, 0.2], [-0.2, 0.0, 0.2]))
     eyes = turn.apply(np.stack([x, np.full_like(x, -STANDOFF_M), z], axis=1))
     seen = []
-    for vertices, faces in (open_sheet, solid(*open_sheet, thickness_m, drawn_along)):
+    for vertices, faces in (open_sheet, solid(*open_sheet, thickness_m)):
         surface = Surface.from_triangles(turn.apply(vertices), faces, 0.03)
         seen.append(toward_the_guns(surface, [(eyes, np.tile(looking, (len(eyes), 1)))]))
     return seen[0], seen[1]
@@ -113,11 +113,8 @@ def test_a_rounded_line_across_the_door_is_no_hem(turn_deg, radius_m):
                         np.linspace(half_m, 0.2, 8)])  # fmt: skip
     within = np.minimum(np.abs(z), half_m)
     y = radius_m - np.sqrt(radius_m**2 - within**2) + (np.abs(z) - within) * np.tan(lean)
-    grid = np.arange(len(x) * len(z)).reshape(len(x), len(z))
-    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
-    faces = np.concatenate([np.stack(t, 2).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
-    vertices = np.stack([np.repeat(x, len(z)), np.tile(y, len(x)), np.tile(z, len(x))], axis=1)
-    surface = Surface.from_triangles(vertices, faces, 0.02)
+    grid = np.stack(np.broadcast_arrays(x[:, np.newaxis], y, z), axis=2)
+    surface = Surface.from_triangles(*on_grid(grid), 0.02)
     middle = surface.at([[0.0, 0.0, 0.0]])
     assert middle.edge_distance_m[0] == pytest.approx(0.2, abs=1e-6)
     assert middle.curvature_per_m[0] < -np.radians(turn_deg) / 0.06

@@ -9,7 +9,7 @@ from paint_deposition.errors import MeshError
 from paint_deposition.part.edges import Edges, coarse_faces
 from paint_deposition.part.refinement import face_areas_m2, refine
 from paint_deposition.part.surface import Surface
-from surfaces import ball, flat, triangulated
+from surfaces import ball, flat, on_grid, triangulated
 
 
 @pytest.mark.parametrize('max_edge_length_m', [0.05, 0.02, 0.007])
@@ -80,15 +80,11 @@ def test_too_many_triangles_are_refused_with_an_edge_length():
 
 def test_a_picture_has_triangles_as_large_as_its_cells_and_joins_no_patches():
     line = np.linspace(0.0, 1.0, 201)
-    x, y = (grid.ravel() for grid in np.meshgrid(line, line))
-    corner = (np.arange(200)[:, None] * 201 + np.arange(200)).ravel()
-    quads = np.stack(
-        [corner, corner + 1, corner + 202, corner, corner + 202, corner + 201], axis=1
-    )
-    level = np.stack([x, y, 0 * x], axis=1)
+    x, y = np.meshgrid(line, line, indexing='ij')
+    level, over = on_grid(np.stack([x, y, 0.0 * x], axis=2))
     # Two sheets that meet at x = 0 without a common vertex, as at a crease.
     vertices = np.concatenate([level, level * [-1.0, 1.0, 1.0]])
-    faces = np.concatenate([quads.reshape(-1, 3), quads.reshape(-1, 3)[:, ::-1] + len(level)])
+    faces = np.concatenate([over, over[:, ::-1] + len(level)])
     coarse = coarse_faces(vertices, faces, 0.02)
     assert len(coarse) < len(faces) / 10
     assert face_areas_m2(vertices, coarse).sum() == pytest.approx(2.0, rel=0.03)

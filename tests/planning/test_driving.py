@@ -23,8 +23,8 @@ from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import driven, plan
 from paint_deposition.planning.programme import Programme
 from paint_deposition.planning.requests import PlanRequest
-from planning.test_surface_map import sheet
 from scenes import painted
+from surfaces import sheet
 
 pytestmark = pytest.mark.slow
 

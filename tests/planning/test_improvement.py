@@ -23,8 +23,8 @@ from paint_deposition.planning.plan import plan
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import ImproveRequest, PlanRequest
 from paint_deposition.report.pictures.planning import write_improvement_picture
-from planning.test_surface_map import sheet
 from scenes import stamps_ns, straight_pass
+from surfaces import sheet
 
 NARROW = pd.DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.1, r_m=0.1, sigma1_m=0.06, sigma2_m=0.1)

@@ -14,8 +14,8 @@ from paint_deposition.planning.plan import plan
 from paint_deposition.planning.planned_film import evenness
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.report.writers.plans import write_passes
-from planning.test_surface_map import sheet
 from scenes import painted
+from surfaces import sheet
 
 pytestmark = pytest.mark.slow
 

@@ -21,20 +21,7 @@ from paint_deposition.planning.passes import (
 from paint_deposition.planning.planned_film import contacts
 from paint_deposition.planning.requests import GunEnvelope
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
-
-
-def sheet(height, half_m=0.5, count=41) -> Surface:
-    """A surface y = height(x, z) that stands and looks to -y."""
-    line = np.linspace(-half_m, half_m, count)
-    x, z = (grid.ravel() for grid in np.meshgrid(line, line, indexing='ij'))
-    i = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
-    faces = np.concatenate(
-        [
-            np.stack([i, i + count, i + 1], axis=1),
-            np.stack([i + count, i + count + 1, i + 1], axis=1),
-        ]
-    )
-    return Surface.from_triangles(np.stack([x, height(x, z), z], axis=1), faces, 0.05)
+from surfaces import sheet
 
 
 def test_axes_of_a_standing_part_seen_from_its_gun():

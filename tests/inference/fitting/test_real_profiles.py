@@ -13,13 +13,10 @@ from scipy.optimize import least_squares
 
 from paint_deposition.inference.fitting.panel import Panel, PanelFit, fit_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
 from paint_deposition.part.points import SurfacePoints
 from scenes import painted, straight_pass
 
 SHIPPED = json.loads(Path(__file__).with_name('real_profiles.json').read_text())
-COLLAPSE = ThreeGaussianCollapse(**SHIPPED['eq3'])
-STATIONS_FT, LANE_SPACING_FT = np.arange(-150.0, 151.0, 20.0), 224.0
 
 
 def table(path: Path) -> np.ndarray:

@@ -6,8 +6,9 @@ from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, Part
 from rclpy.serialization import deserialize_message, serialize_message
 
+from files.recorded import TF, Messages
 from nodes.cell import START_NS
-from paint_deposition.files.recordings.messages import TF_TYPES, own_types, stamp_ns
+from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.nodes.bags.initial_messages import InitialMessages
 from paint_deposition.nodes.runtime.topics import header, state_message
@@ -71,21 +72,9 @@ def test_of_two_states_with_one_stamp_the_one_sent_later_holds_whichever_comes_f
 
 
 def test_a_static_transform_that_is_sent_again_takes_the_place_of_the_former():
-    memory, store = InitialMessages({'': (POSE, STATE)}, '/part_pose'), own_types()
-    kinds = store.types
+    memory, messages = InitialMessages({'': (POSE, STATE)}, '/part_pose'), Messages()
     for sent_s, (child, x) in enumerate([('a', 1.0), ('b', 2.0), ('a', 3.0)]):
-        placed = kinds['geometry_msgs/msg/TransformStamped'](
-            header=kinds['std_msgs/msg/Header'](
-                stamp=kinds['builtin_interfaces/msg/Time'](sec=0, nanosec=0), frame_id='world'
-            ),
-            child_frame_id=child,
-            transform=kinds['geometry_msgs/msg/Transform'](
-                translation=kinds['geometry_msgs/msg/Vector3'](x=x, y=0.0, z=0.0),
-                rotation=kinds['geometry_msgs/msg/Quaternion'](x=0.0, y=0.0, z=0.0, w=1.0),
-            ),
-        )
-        message = kinds[TF_TYPES[0]](transforms=[placed])
-        cdr = bytes(store.serialize_cdr(message, TF_TYPES[0]))
-        memory.add('/tf_static', cdr, sent_s * S, sent_s * S)
-    begun = [store.deserialize_cdr(m.cdr, TF_TYPES[0]).transforms for m in memory.begin_run(9 * S)]
+        cdr = messages.serialised(messages.transforms((0, 'world', child, [x, 0, 0, 0, 0, 0, 1])))
+        memory.add('/tf_static', bytes(cdr), sent_s * S, sent_s * S)
+    begun = [messages.store.deserialize_cdr(m.cdr, TF).transforms for m in memory.begin_run(9 * S)]
     assert [placed.transform.translation.x for (placed,) in begun] == [2.0, 3.0]

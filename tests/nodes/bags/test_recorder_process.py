@@ -1,16 +1,12 @@
-"""A recorder as a process: killed, told to end, its folder taken away, its disk full."""
+"""A recorder as a process: killed, told to end, its folder taken away."""
 
 import contextlib
 import itertools
 import shutil
-import subprocess
 
-import numpy as np
-import pytest
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from rosbags.rosbag2 import Reader
-from std_msgs.msg import String
 
 from files.recorded import START_NS
 from nodes.bags.runs import pose
@@ -64,42 +60,3 @@ def test_a_killed_recorder_keeps_what_came_a_moment_before(
         (connection,) = reader.connections
         assert connection.digest.startswith('RIHS01_')
         assert connection.ext.offered_qos_profiles[0].reliability.name == 'RELIABLE'
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of one megabyte."""
-    folder = tmp_path / 'small_disk'
-    folder.mkdir()
-    mounted = subprocess.run(
-        ['mount', '-t', 'tmpfs', '-o', 'size=1m', 'tmpfs', str(folder)],
-        capture_output=True,
-        check=False,
-    )
-    if mounted.returncode != 0:
-        pytest.skip('a small file system can be mounted by root alone')
-    yield folder
-    subprocess.run(['umount', '-l', str(folder)], check=True)
-
-
-def test_a_full_disk_ends_the_recorder(ros_domain, cell, wait_until, tmp_path, small_disk):
-    chatter = cell.create_publisher(String, 'chatter', QoSProfile(depth=100))
-    noise = np.random.default_rng(2)
-    with NodeProcess(
-        tmp_path / 'recorder',
-        MODULE,
-        output_directory=small_disk,
-        name='run',
-        topics='[chatter]',
-        compression='none',
-    ) as process:
-        wait_until(lambda: chatter.get_subscription_count() > 0)
-        cell.create_timer(0.002, lambda: chatter.publish(String(data=noise.bytes(5_000).hex())))
-        wait_until(lambda: process.exit_code is not None, what='the end')
-        assert process.exit_code == 2
-        assert 'No space left on device; run `paint recover' in process.err
-    assert not (small_disk / 'run/metadata.yaml').exists()
-    recovery = recover(small_disk / 'run', tmp_path / 'recovered')
-    # A megabyte of messages of 10 kB, less the chunk that did not fit.
-    assert 85 <= recovery.message_count <= 105
-    shutil.rmtree(small_disk / 'run')

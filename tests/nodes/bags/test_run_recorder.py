@@ -127,9 +127,7 @@ def test_a_model_changed_meanwhile_is_in_the_recording(record, start, wait_until
 def test_bad_input_is_reported_at_the_start(record):
     for values, says in (
         ({'mesh_file': '/nowhere.stl'}, 'mesh_file /nowhere.stl: No such file or directory'),
-        ({'compression': 'zip'}, "compression is 'zip'; give 'none', 'lz4' or 'zstd'"),
         ({'output_directory': '/dev/null/runs'}, 'cannot create /dev/null/runs/run'),
-        ({'topic': 'x'}, 'run_recorder has no parameter topic; did you mean'),
     ):
         with pytest.raises(pd.PaintError, match=says):
             record(**values)

@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, UInt16
 
 from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
@@ -181,8 +182,8 @@ def test_a_signal_that_was_overtaken_takes_effect_with_the_newest(
     assert math.isnan(states[0].voltage_kv)
 
 
-def test_joint_states_that_are_refused_from_then_on_are_told(source, monkeypatch):
-    poses = JointPoses(source()._robot, 'joints', lambda *_: None)
+def test_joint_states_that_are_refused_from_then_on_are_told(monkeypatch):
+    poses = JointPoses(Robot.read(URDF), 'joints', lambda *_: None)
     for names in (JOINTS, JOINTS[:5]):
         message = JointState(name=list(names), position=WAY[0, : len(names)].tolist())
         poses.take('joints', message, {'source_timestamp': 0})

@@ -132,11 +132,9 @@ def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(start, onlo
         robot.bind(('127.0.0.1', 0))
         robot.settimeout(0.05)
         for number in range(1, 41):
-            tm_ms = int(1e3 * time.monotonic()) & 0xFFFFFFFF
             for _ in range(1 + (number == 30)):
                 if number not in (10, 11):
-                    robot.sendto(egm_robot(number, tm_ms), ('127.0.0.1', port))
-            time.sleep(0.004)
+                    robot.sendto(egm_robot(number, 4 * number), ('127.0.0.1', port))
         wait_until(lambda: len(viewer.heard['atomizer/pose']) == 38, what='the poses')
         with pytest.raises(TimeoutError):
             robot.recvfrom(100)
@@ -158,7 +156,7 @@ def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(start, onlo
         (0, False, 'packets have no pose: give EGM a tool'),
     ],
 )
-def test_what_packets_lack_is_told(start, onlooker, wait_until, axes, placed, told):
+def test_what_packets_lack_is_told(start, onlooker, wait_until, monkeypatch, axes, placed, told):
     names = [f'axis_{k}' for k in range(axes)]
     node = start(
         EgmSource, address='127.0.0.1', port=16511, external_joints=names,
@@ -173,7 +171,12 @@ def test_what_packets_lack_is_told(start, onlooker, wait_until, axes, placed, to
             return viewer.reports('egm_source: robot', told, b'\x02')
 
         wait_until(says, what=told)
-    # Whatever else the thread fails with ends the process.
-    node._socket.close()
-    wait_until(node.finished.done, what='the end')
+
+        def broken(*_: object) -> None:
+            raise OSError('the network is gone')
+
+        # Whatever else the thread fails with ends the process.
+        monkeypatch.setattr(EgmStream, 'take', broken)
+        says()
+        wait_until(node.finished.done, what='the end')
     assert isinstance(node.finished.exception(), OSError)

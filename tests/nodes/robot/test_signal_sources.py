@@ -298,7 +298,8 @@ def test_a_value_of_the_future_counts_from_its_arrival(ros_context, monkeypatch)
 
     node = Silent(context=ros_context, parameter_overrides=parameters(trigger='gun'))
     states: list[AtomizerState] = []
-    monkeypatch.setattr(node._publisher, 'publish', states.append)
+    (publisher,) = (p for p in node.publishers if p.topic_name == '/atomizer/state')
+    monkeypatch.setattr(publisher, 'publish', states.append)
     for value in (0.0, 1.0):
         node.take('gun', value, time.time_ns() + 80_000_000_000)
         assert stamp_ns(states[-1].header) <= time.time_ns()

@@ -7,15 +7,9 @@ from rcl_interfaces.msg import ParameterType
 
 from nodes.cell import parameters
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.bags.bag_player import BagPlayer
-from paint_deposition.nodes.bags.run_recorder import RunRecorder
-from paint_deposition.nodes.index_planner import IndexPlanner
-from paint_deposition.nodes.model_comparison import ModelComparison
-from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.parameters import NodeParameter
-
-NODES = (BagPlayer, DepositionSimulator, IndexPlanner, ModelComparison, RunRecorder)
+from test_packaging import NODES, table_of
 
 TABLE = {
     'rate_hz': NodeParameter(2.0, 'Rate [Hz]', (0.1, 100.0)),
@@ -119,9 +113,9 @@ def test_sim_time_and_qos_overrides_are_not_ours(declared):
     declared(use_sim_time=False, **{'qos_overrides./tf.publisher.depth': 3})
 
 
-@pytest.mark.parametrize('node_class', NODES)
-def test_every_description_states_a_unit_and_every_fixed_one_why(node_class):
-    for name, row in node_class.PARAMETERS.items():
+@pytest.mark.parametrize('node', NODES)
+def test_every_description_states_a_unit_and_every_fixed_one_why(node):
+    for name, row in table_of(node).items():
         assert row.description.endswith(']'), name
         assert row.checked(name, row.default) == row.default, name
-        assert len(row.fixed_because) > 20 or node_class not in (BagPlayer, RunRecorder), name
+        assert len(row.fixed_because) > 20 or node not in ('bag_player', 'run_recorder'), name

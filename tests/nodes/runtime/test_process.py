@@ -41,7 +41,7 @@ class Worker(PaintNode):
         if 'load' in self.values['does']:
             print('loading', flush=True)
             while True:
-                time.sleep(0.01)
+                signal.pause()
 
     def work(self):
         if not self.ready:

@@ -7,6 +7,10 @@ import yaml
 from rclpy.qos import DurabilityPolicy
 
 from booth import SAMPLES
+from paint_deposition.nodes.bags.bag_player import BagPlayer
+from paint_deposition.nodes.index_planner import IndexPlanner
+from paint_deposition.nodes.model_comparison import ModelComparison
+from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
 LAYOUTS = SAMPLES.parent / 'config'
 # What a display of RViz shows.
@@ -19,24 +23,17 @@ RVIZ = {
 
 
 @pytest.fixture
-def publishers(ros_context, spin):
+def publishers(start):
     """The publishers of all nodes that a viewer looks at, by topic."""
-    from nodes.cell import parameters
-    from paint_deposition.nodes.bags.bag_player import BagPlayer
-    from paint_deposition.nodes.index_planner import IndexPlanner
-    from paint_deposition.nodes.model_comparison import ModelComparison
-    from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-
     panel = SAMPLES / 'panel_study'
     part = {'mesh_file': str(panel / 'panel.stl'), 'max_edge_length_m': 0.1}
     readings = {'measurements_file': str(panel / 'panel_577.csv')}
-    replay = {'bag': str(SAMPLES / 'door_horizontal'), 'start_paused': True}
-    nodes = {
-        DepositionSimulator: part, ModelComparison: part | readings, IndexPlanner: {},
-        BagPlayer: replay,
-    }  # fmt: skip
-    made = [n(context=ros_context, parameter_overrides=parameters(**v)) for n, v in nodes.items()]
-    spin(*made)
+    made = [
+        start(DepositionSimulator, **part),
+        start(ModelComparison, **part, **readings),
+        start(IndexPlanner),
+        start(BagPlayer, bag=str(SAMPLES / 'door_horizontal'), start_paused=True),
+    ]
     return {publisher.topic_name: publisher for node in made for publisher in node.publishers}
 
 

@@ -264,7 +264,7 @@ class OpcuaSource(SignalSource):
         ),
         security_policy=NodeParameter(
             'None',
-            'How messages are signed and encrypted',
+            'How messages are signed and encrypted [name]',
             choices=('None', 'Basic256Sha256', 'Aes128Sha256RsaOaep', 'Aes256Sha256RsaPss'),
         ),
         certificate_file=NodeParameter('', 'Certificate of this client, DER or PEM [path]'),

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.worlds import droplets, semi_real
+from benchmarks.worlds.measured import available
+from benchmarks.worlds.record import KINDS, detectability
+from tests.virtual_paint_shop.gauge import GaugeNoise
 
 import paint_deposition as pd
-from virtual_paint_shop.gauge import GaugeNoise
-from worlds import droplets, semi_real
-from worlds.measured import available
-from worlds.record import KINDS, detectability
 
 WIDTH_M, FLOW = 0.09, 1.5
 MODEL = f"""

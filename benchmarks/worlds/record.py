@@ -12,8 +12,7 @@ import numpy as np
 import trimesh
 import yaml
 from scipy.linalg import block_diag
-
-from virtual_paint_shop.files import POSE_TOPIC, STATE_TOPIC, write_bag
+from tests.virtual_paint_shop.files import POSE_TOPIC, STATE_TOPIC, write_bag
 
 # Kinds of truth: nothing hidden, effects of the library, a cause in no library, a strange pattern.
 KINDS = ('clean', 'effect', 'pair', 'unknown', 'footprint')

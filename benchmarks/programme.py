@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-
-from .draw import stream
-from .gauge import GaugeNoise
-from .jobs import Job, Motion, Plan
-from .parcels import Pattern
-from .shop import PARCELS, Bench, Experiment, gauged
-from .truths import Truth
+from tests.virtual_paint_shop.draw import stream
+from tests.virtual_paint_shop.gauge import GaugeNoise
+from tests.virtual_paint_shop.jobs import Job, Motion, Plan
+from tests.virtual_paint_shop.parcels import Pattern
+from tests.virtual_paint_shop.shop import PARCELS, Bench, Experiment, gauged
+from tests.virtual_paint_shop.truths import Truth
 
 # The gun stands below this share of its greatest speed: there a pass ends.
 STANDS = 0.02

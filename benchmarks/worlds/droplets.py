@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from virtual_paint_shop.conner import film_um
-from virtual_paint_shop.draw import draw_jobs, stream
-from virtual_paint_shop.gauge import GaugeNoise, measure
-from virtual_paint_shop.jobs import Job
-from virtual_paint_shop.parcels import Pattern
-from virtual_paint_shop.shop import Campaign, Experiment, generate
-from virtual_paint_shop.truths import Truth, choose, library
+from tests.virtual_paint_shop.conner import film_um
+from tests.virtual_paint_shop.draw import draw_jobs, stream
+from tests.virtual_paint_shop.gauge import GaugeNoise, measure
+from tests.virtual_paint_shop.jobs import Job
+from tests.virtual_paint_shop.parcels import Pattern
+from tests.virtual_paint_shop.shop import Campaign, Experiment, generate
+from tests.virtual_paint_shop.truths import Truth, choose, library
 
 from .record import Judged, Painted, Part, strengths
 
