@@ -18,9 +18,9 @@ from paint_deposition.batch import sweep_file
 from paint_deposition.batch.cases import compute, workers
 from paint_deposition.batch.job import Job, computed
 from paint_deposition.batch.sweep_file import SweepFile, varied_motion
-from paint_deposition.effects.catalogue import effects_allowed
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import BatchError
+from paint_deposition.files.effect_file import effects_allowed
 from paint_deposition.model.eq1_pattern import Brush, PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 

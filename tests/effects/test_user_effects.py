@@ -15,9 +15,9 @@ from numba import njit
 import paint_deposition as pd
 from booth import SAMPLES, painted, panel, path_of, serpentine
 from paint_deposition.effects.base import Effect, PathContext, SprayPath
-from paint_deposition.effects.catalogue import load_effect_file
-from paint_deposition.effects.trial import NEEDS, PLACES, TRIAL_RAYS
 from paint_deposition.errors import ModelError
+from paint_deposition.files.effect_file import load_effect_file
+from paint_deposition.files.effect_trial import NEEDS, PLACES, TRIAL_RAYS
 from paint_deposition.kernel.laws import Ray, in_precision
 
 SAMPLE = (SAMPLES / 'my_effect.py').read_text()
@@ -227,7 +227,7 @@ RUN = """
 import sys
 
 from paint_deposition.effects.base import Ray
-from paint_deposition.effects.catalogue import load_effect_file
+from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.laws import product
 

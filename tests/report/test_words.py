@@ -8,10 +8,11 @@ import pytest
 
 from booth import SAMPLES
 from paint_deposition.effects.base import Effect, parameter
-from paint_deposition.effects.catalogue import LEARNED, load_effect_file
+from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import WAVES, LearnedFootprint, LearnedMap, PartGrid
 from paint_deposition.effects.library.flow_drift import FlowDrift
+from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.study import Study

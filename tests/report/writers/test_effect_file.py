@@ -10,9 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
-from paint_deposition.effects.catalogue import LEARNED, load_effect_file
+from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.diagnosis import closed_forms

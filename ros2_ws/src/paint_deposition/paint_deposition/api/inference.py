@@ -6,9 +6,10 @@ from typing import Any
 
 from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS, effect_class, load_unnamed_effect_file
+from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
+from paint_deposition.files.effect_file import load_unnamed_effect_file
 from paint_deposition.files.model_file import read_model, read_model_file, require_file
 from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide

@@ -24,9 +24,9 @@ from typing import TYPE_CHECKING, Any
 
 import paint_deposition
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import effect_of
 from paint_deposition.errors import BatchError
 from paint_deposition.files.atomic import json_text, write_parquet
+from paint_deposition.files.effect_file import effect_of
 
 if TYPE_CHECKING:
     import pyarrow as pa

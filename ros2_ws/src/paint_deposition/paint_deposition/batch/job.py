@@ -21,9 +21,9 @@ from paint_deposition.batch.sweep_file import (
     varied_motion,
 )
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import BatchError, PaintError
+from paint_deposition.files.effect_file import load_unnamed_effect_file
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import ModelFile, read_model_file

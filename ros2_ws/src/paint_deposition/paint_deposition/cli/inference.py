@@ -43,7 +43,7 @@ def _run(
     The ``verb`` takes of the model's file what it ``begins_with``, and ``lines`` put its result
     into words. The line on the model says whether it was ``fitted``, or is ``words``.
     """
-    from paint_deposition.effects.catalogue import load_effect_file, load_unnamed_effect_file
+    from paint_deposition.files.effect_file import load_effect_file, load_unnamed_effect_file
     from paint_deposition.files.model_file import read_model_file
 
     with Progress(command) as show:
@@ -192,7 +192,7 @@ def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) ->
     Writes diagnosis.json, model.yaml with what was accepted, model_before.yaml without it,
     residuals.csv, comparison.png and report.html.
     """
-    from paint_deposition.effects.catalogue import load_effect_file
+    from paint_deposition.files.effect_file import load_effect_file
 
     own = [load_effect_file(file) for file in effect_files]
     _run('diagnose', partial(pd.diagnose, own_effects=own, seed=seed), _diagnosis_lines, **given)
@@ -222,7 +222,8 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
     Writes model.yaml with its history, report.html and the other files that diagnose writes. To go
     on from there, give that model.yaml as --model.
     """
-    from paint_deposition.effects.catalogue import effect_class, load_effect_file
+    from paint_deposition.effects.catalogue import effect_class
+    from paint_deposition.files.effect_file import load_effect_file
 
     added = None
     if effect != 'none':

@@ -45,7 +45,7 @@ def chosen_model(given: Path | None, brush: int = 0, named: bool = True) -> Chos
 
     A file that is not ``named`` by the user, but by a recording, runs no effect files unasked.
     """
-    from paint_deposition.effects.catalogue import load_effect_file, load_unnamed_effect_file
+    from paint_deposition.files.effect_file import load_effect_file, load_unnamed_effect_file
     from paint_deposition.files.model_file import read_model_file
 
     if given is None:

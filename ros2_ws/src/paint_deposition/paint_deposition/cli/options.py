@@ -198,7 +198,7 @@ def _pose(ctx: click.Context, param: click.Parameter, given: tuple | None) -> li
 
 def _allow_effects(ctx: click.Context, param: click.Parameter, given: bool) -> None:
     if given:
-        from paint_deposition.effects.catalogue import effects_allowed
+        from paint_deposition.files.effect_file import effects_allowed
 
         token = effects_allowed.set(True)
         ctx.call_on_close(lambda: effects_allowed.reset(token))

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition import __version__, git_version
-from paint_deposition.effects.catalogue import load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.atomic import (
@@ -22,6 +21,7 @@ from paint_deposition.files.atomic import (
     read_file,
     require_file,
 )
+from paint_deposition.files.effect_file import load_unnamed_effect_file
 from paint_deposition.files.model_file import ModelFile, model_source, read_model_file
 from paint_deposition.files.rapid.program import is_rapid
 from paint_deposition.files.recordings.bag_files import custom_data

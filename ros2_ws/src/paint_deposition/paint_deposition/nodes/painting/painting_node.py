@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from rclpy.timer import Timer
 
-from paint_deposition.effects.catalogue import read_effect_file, try_effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
+from paint_deposition.files.effect_file import read_effect_file, try_effect
 from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.film.live_film import LiveFilm

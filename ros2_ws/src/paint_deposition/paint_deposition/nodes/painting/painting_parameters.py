@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import load_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError
+from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import LoadEffect, read_model
 from paint_deposition.film.common_film import LiveFilms, require_same_film_effects
