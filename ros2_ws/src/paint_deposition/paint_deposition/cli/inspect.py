@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 import paint_deposition as pd
 from paint_deposition.cli import options
@@ -82,13 +81,7 @@ def inspect_command(
 
 def _only(what: str, *names: str) -> None:
     """Refuse the options that were given and do nothing for what is shown; these do something."""
-    context = click.get_current_context()
-    known = {*names, 'recording', 'trajectory', 'as_json', 'allow_effects'}
-    given = [
-        one.opts[0] for one in context.command.params
-        if one.name and one.name not in known
-        and context.get_parameter_source(one.name) is ParameterSource.COMMANDLINE
-    ]  # fmt: skip
+    given = options.given_beside(*names, 'recording', 'trajectory', 'as_json', 'allow_effects')
     if given:
         raise click.UsageError(f'{" ".join(given)}: not for {what}; leave it out, or give --mesh')
 

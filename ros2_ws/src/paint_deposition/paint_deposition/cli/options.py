@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 import click
 from annotated_types import Ge, Gt, Le, Lt, MaxLen
+from click.core import ParameterSource
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
@@ -234,6 +235,16 @@ def model_option(text: str = 'Deposition model, YAML; default: a 50 mm bell.') -
 def seed_option(of: str) -> Decorator:
     """The seed of what a command draws at random."""
     return click.option('--seed', default=0, show_default=True, help=f'Random seed of {of}.')
+
+
+def given_beside(*names: str) -> list[str]:
+    """The options of this command that the user gave, but those of these parameters."""
+    context = click.get_current_context()
+    return [
+        one.opts[0] for one in context.command.params
+        if one.name not in names
+        and context.get_parameter_source(one.name or '') is ParameterSource.COMMANDLINE
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from threading import Event
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 import paint_deposition as pd
 from paint_deposition.cli import options
@@ -76,12 +75,8 @@ def watch_command(
     if live and not part.mesh:
         raise click.UsageError("--live needs the mesh of the simulator's part; give --mesh")
     if run is None:
-        context = click.get_current_context()
-        for option in context.command.params:
-            name = option.name or ''
-            is_given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-            if is_given and name not in OF_LIVE:
-                raise click.UsageError(f'{option.opts[0]} is for a recorded RUN, not for --live')
+        if others := options.given_beside(*OF_LIVE):
+            raise click.UsageError(f'{others[0]} is for a recorded RUN, not for --live')
         values = {
             'mesh_file': part.mesh, 'mesh_scale': part.mesh_scale,
             'max_edge_length_m': part.max_edge_length_m, 'target_um': band.target_um,
