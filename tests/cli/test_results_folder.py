@@ -179,8 +179,9 @@ import signal, sys
 from pathlib import Path
 from paint_deposition.cli import main
 from paint_deposition.cli.results import results_in
-# As at a terminal: a shell ignores it for what it runs in the background.
+# As at a terminal: for what runs in the background a shell ignores the one, nohup the other.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 def work(context):
     with results_in(Path(sys.argv[1])) as folder:
         (folder / 'half').touch()
