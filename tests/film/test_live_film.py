@@ -9,6 +9,7 @@ import paint_deposition as pd
 from brushes import two_brushes
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.errors import ModelError
+from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.pose_stream import TriggerChange
 from scenes import (
@@ -48,6 +49,20 @@ def test_a_state_that_comes_a_little_late_cuts_where_it_belongs(batch, delay_s):
     film = followed(events(motion, batch, delay_s), trigger_latency_s=latency_s)
     assert np.array_equal(film.snapshot().film_um, painted(lying_plane(), motion).film_um)
     assert film.counts.late_triggers == 0
+
+
+def test_a_reset_before_any_pose_forgets_no_state():
+    """A run begins with the states in force, and no other is announced where none has a pose."""
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    first, *rest = changes_of(motion)
+    # Sent after the first, by a clock that was an hour behind.
+    behind = TriggerChange(first.stamp_ns - 3_600_000_000_000, 0.0)
+    films = LiveFilms((LiveFilm(lying_plane(), MODEL),))
+    for change in (first, behind):
+        films.guns[0].add_trigger(change)
+    films.reset()
+    films.guns[0].replay([*rest, poses(motion, slice(0, None))])
+    assert np.array_equal(films.snapshot().film_um, painted(lying_plane(), motion).film_um)
 
 
 @pytest.mark.slow

@@ -222,8 +222,8 @@ class LiveFilms:
         return CommonFilm(tuple(gun.snapshot() for gun in self.guns))
 
     def reset(self) -> None:
-        """Clear the film."""
-        for gun in self.guns:
+        """Clear the film; one that no pose has reached is clear, and forgets no change of a gun."""
+        for gun in self.guns if self.counts.received else ():
             gun.reset()
 
     def warm_up(self) -> None:
