@@ -222,7 +222,7 @@ class LiveFilms:
         return CommonFilm(tuple(gun.snapshot() for gun in self.guns))
 
     def reset(self) -> None:
-        """Clear the film; one that no pose has reached is clear, and forgets no change of a gun."""
+        """Clear the film; one that no pose has reached forgets no change of a gun."""
         for gun in self.guns if self.counts.received else ():
             gun.reset()
 
