@@ -69,12 +69,13 @@ class PartFrame:
         # As it is published, and so recorded: to the last bit.
         place = Rigid.of(part_pose).values if len(part_pose) else ()
         self.take_part_pose(parent_frame, place)
-        if not place:
-            return
-        if self._publisher is None:
+        # A recorder hears of it before there is a pose, which is then in the run of its part.
+        if parent_frame and self._publisher is None:
             self._publisher = self._node.create_publisher(
                 TransformStamped, PART_POSE_TOPIC, topics.LATCHED
             )
+        if not (place and self._publisher):
+            return
         placed = TransformStamped(child_frame_id=self.frame_id)
         placed.header = header(parent_frame.lstrip('/'), self._node.get_clock().now().nanoseconds)
         t, q = placed.transform.translation, placed.transform.rotation
