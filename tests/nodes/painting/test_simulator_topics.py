@@ -10,8 +10,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from nodes.cell import Robot, offline_um, two_passes
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.film.statistics import film_statistics
-from paint_deposition.nodes.painting.film_display import STATS_FIELDS
+from paint_deposition.film.statistics import FIGURES, film_statistics
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.report.colour_scales import FILM_PALETTE
 
@@ -61,7 +60,7 @@ def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted
         assert stamp_ns(message.header) == MOTION.stamps_ns[-1]
     area = node.surface.vertex_areas_m2
     expected = film_statistics(film, area, 1.9 * sprayed_s, **target)
-    for name in STATS_FIELDS:
+    for name in FIGURES:
         assert getattr(stats, name) == pytest.approx(getattr(expected, name), rel=1e-6), name
     assert (stats.poses_rejected, stats.pose_gaps) == (0, 0)
 

@@ -24,6 +24,13 @@ CPK_MEANS = (
 )
 
 
+# The attributes of ``FilmStatistics`` that are published while the film grows.
+FIGURES = (
+    'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
+    'painted_volume_cm3', 'capture_fraction',
+)  # fmt: skip
+
+
 @dataclass(frozen=True)
 class FilmStatistics:
     """What the film on a part amounts to; mean to max are over the painted part of its area.

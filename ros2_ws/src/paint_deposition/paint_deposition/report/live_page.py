@@ -20,6 +20,7 @@ from tornado.web import Application, RequestHandler, StaticFileHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from paint_deposition.errors import PaintError
+from paint_deposition.film.statistics import FIGURES
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.colour_scales import FILM_PALETTE, RESIDUAL_PALETTE, ColourScale
 
@@ -27,11 +28,6 @@ DEFAULT_HOST, DEFAULT_PORT = '127.0.0.1', 8090
 # The variable of the environment for the token: others can read the words of a command.
 TOKEN = 'PAINT_TOKEN'
 THIS_MACHINE = ('127.0.0.1', 'localhost', '::1')
-# Columns of the history of the film, behind the time [s]; names of ``FilmStatistics``.
-FIGURES = (
-    'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
-    'painted_volume_cm3', 'capture_fraction',
-)  # fmt: skip
 # Steps in which the film is shown, finer than a gauge's: less is no change that travels.
 STEP_UM = 1.0 / 32.0
 # Rows of a series beyond which its older half is forgotten: hours of figures, 500 m of a track.

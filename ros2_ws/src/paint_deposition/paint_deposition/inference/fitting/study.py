@@ -319,22 +319,20 @@ class Study:
         """Whether whole parts can be left out."""
         return len(self.campaign.experiments) > 1
 
-    def folds(self, seed: int = 0) -> np.ndarray:
+    def folds(self) -> np.ndarray:
         """(P,) number of the fold in which each point is left out.
 
         Whole parts where there are several, else patches of the one part.
         """
-        return (
-            self.campaign.experiment_of % FOLDS if self.has_several_parts else self.patches(seed)
-        )
+        return self.campaign.experiment_of % FOLDS if self.has_several_parts else self.patches()
 
-    def patches(self, seed: int = 0) -> np.ndarray:
+    def patches(self) -> np.ndarray:
         """(P,) number of the patch of its part in which each point lies."""
         patch, part = np.zeros(len(self), dtype=int), self.campaign.experiment_of
         for k in range(len(self.campaign.experiments)):
             places = self.campaign.positions_m[part == k]
             count = min(FOLDS, len(np.unique(places, axis=0)))
-            patch[part == k] = kmeans2(places / places.std(), count, minit='++', rng=seed)[1]
+            patch[part == k] = kmeans2(places / places.std(), count, minit='++', rng=0)[1]
         return patch
 
     def passes(self, model: DepositionModel) -> np.ndarray:

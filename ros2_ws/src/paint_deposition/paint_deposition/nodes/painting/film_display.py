@@ -20,7 +20,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.film.common_film import CommonFilm
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.film.statistics import FIGURES, FilmStatistics, film_statistics
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.topics import ColouredMesh, gun_topic, header, white_marker
@@ -31,10 +31,6 @@ from paint_deposition.report.colour_scales import TABLE, ColourScale, film_scale
 
 # A subscriber that acknowledges nothing for so long does not delay the others.
 ACKNOWLEDGE_TIMEOUT_S = 5.0
-STATS_FIELDS = (
-    'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
-    'painted_volume_cm3', 'capture_fraction',
-)  # fmt: skip
 
 
 def statistics_of(
@@ -194,7 +190,7 @@ class FilmDisplay:
             atomizers=list(laid_cm3),
             atomizer_volume_cm3=list(laid_cm3.values()),
             atomizer_share=list(shares(laid_cm3).values()),
-            **{name: getattr(figures, name) for name in STATS_FIELDS},
+            **{name: getattr(figures, name) for name in FIGURES},
         )
         self._counts = None
         self._scale = film_scale(self._film_um, values['color_min_um'], values['color_max_um'])

@@ -34,8 +34,8 @@ MESSAGES = {
 
 
 @cache
-def egm_message(name: str = 'Robot') -> Any:
-    """The class of a message in ``MESSAGES``, for all of EgmRobot that is read.
+def egm_message() -> Any:
+    """The class of the message ``Robot`` in ``MESSAGES``: all of EgmRobot that is read.
 
     Raises PaintError where protobuf is not installed.
     """
@@ -58,7 +58,7 @@ def egm_message(name: str = 'Robot') -> Any:
                 made.type = getattr(kinds, f'TYPE_{kind.rstrip("s").upper()}')
     pool = descriptor_pool.DescriptorPool()
     pool.Add(file)
-    return message_factory.GetMessageClass(pool.FindMessageTypeByName(f'egm_read.{name}'))
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName('egm_read.Robot'))
 
 
 # Stamp [ns]; TCP in the correction frame x y z [m] qx qy qz qw, None if none was sent; the robot's
