@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from functools import reduce
 from itertools import pairwise
 from operator import itemgetter, matmul
+from typing import Any
 
 import numpy as np
 
@@ -20,11 +21,15 @@ FAR_BEHIND_NS, CLOCK_NS = 1_000_000_000, 1_000_000_000_000_000_000
 STAMP = itemgetter(0)
 
 
+def _is_far_behind(stamp_ns: Any, newest_ns: Any) -> Any:
+    """Whether samples, one or (N,), are late, or of a restarted stream."""
+    of_one_clock = (stamp_ns > 0) | (newest_ns < CLOCK_NS)
+    return (stamp_ns < newest_ns - FAR_BEHIND_NS) & of_one_clock
+
+
 def began_again(stamps_ns: np.ndarray) -> int | None:
     """The row of samples, stamps (N,) as they came, in which a restarted stream is known."""
-    newest = np.maximum.accumulate(stamps_ns)
-    behind = stamps_ns < newest - FAR_BEHIND_NS
-    behind &= (stamps_ns > 0) | (newest < CLOCK_NS)
+    behind = _is_far_behind(stamps_ns, np.maximum.accumulate(stamps_ns))
     again = behind[:-1] & behind[1:] & (np.diff(stamps_ns) > 0)
     return int(np.argmax(again)) if again.any() else None
 
@@ -86,8 +91,7 @@ class FrameTree:
             return False
         name, newest_ns = _name(child), self.newest_ns(child)
         entry = stamp_ns, _name(parent), np.array(pose, dtype=float)
-        is_behind = self._live and stamp_ns < newest_ns - FAR_BEHIND_NS
-        is_behind &= stamp_ns > 0 or newest_ns < CLOCK_NS
+        is_behind = self._live and _is_far_behind(stamp_ns, newest_ns)
         before = self._behind.pop(name, None)
         restarted = False
         if is_behind and before is not None and before[0] < stamp_ns:

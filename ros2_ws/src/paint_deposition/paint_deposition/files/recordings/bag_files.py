@@ -81,9 +81,9 @@ class Bag:
         counts: Counter[tuple[str, str]] = Counter()
         for connection in reader.connections:
             counts[connection.topic, connection.msgtype] += connection.msgcount
-        self.custom_data = custom_data(path)
+        told = _information(path)
+        self.custom_data, named = _custom(told), _named_files(told)
         kept = self.custom_data.get(KEPT, '').split()
-        named = _named_files(_information(path))
         self.warnings: tuple[str, ...] = ()
         self.skipped: Counter[str] = Counter()
         if path.name in named[:-1] or path.name in named[1:]:
@@ -248,7 +248,11 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
 
 def custom_data(path: Path) -> dict[str, str]:
     """The custom data in the metadata.yaml of a rosbag2 folder, or of one of its files."""
-    told = _information(path).get('custom_data')
+    return _custom(_information(path))
+
+
+def _custom(information: dict[str, Any]) -> dict[str, str]:
+    told = information.get('custom_data')
     return {str(key): str(value) for key, value in told.items()} if isinstance(told, dict) else {}
 
 
