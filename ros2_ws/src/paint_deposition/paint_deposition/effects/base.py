@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
@@ -158,6 +159,7 @@ class Effect(BaseModel):
         return cls(**{name: described['typical'] for name, described in cls.parameters().items()})
 
     @classmethod
+    @cache
     def parameters(cls) -> dict[str, dict[str, Any]]:
         """Unit, bounds, neutral and typical value and role of each parameter by name."""
         return {
@@ -172,6 +174,7 @@ class Effect(BaseModel):
         return tuple(n for n, p in cls.parameters().items() if p['role'] == 'amplitude')
 
     @classmethod
+    @cache
     def _neutral(cls) -> dict[str, float]:
         described = cls.parameters()
         return {name: described[name]['neutral'] for name in cls.amplitudes()}

@@ -253,8 +253,9 @@ def gauge_reading_um(
 
 
 def _finite(values_um: np.ndarray, effect: Effect, what: str) -> np.ndarray:
-    odd = np.flatnonzero(~np.isfinite(values_um))
-    if len(odd):
+    finite = np.isfinite(values_um)
+    if not finite.all():
+        odd = np.flatnonzero(~finite)
         raise ModelError(
             f'effect {effect.id!r} gives a {what} of {values_um[odd[0]]} µm at {len(odd)} of '
             f'{len(values_um)} points; correct its law, or take it out of the model'

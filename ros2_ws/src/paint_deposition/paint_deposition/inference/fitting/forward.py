@@ -89,7 +89,7 @@ class Forward:
             before = (*(e for e in before if not e.acts(*LAWS)), *laws.values())
         return _Stages(
             model.model_copy(update={'effects': before}),
-            acting,
+            tuple(effect for effect in acting if effect.acts('on_film', 'on_gauge')),
             any(effect.needs_slope for effect in model.effects),
         )
 
@@ -119,7 +119,7 @@ class _Stages(NamedTuple):
     """A model taken apart."""
 
     arrival: DepositionModel  # with the effects that act before the film has arrived
-    effects: tuple[Effect, ...]  # all that act
+    finishing: tuple[Effect, ...]  # those that act on the film or the gauge
     slope: bool  # whether one needs the film's slope
 
 
@@ -151,10 +151,10 @@ class _Part:
         """(P,) gauge readings [um] of what arrived."""
         points, films = self.points(stages.slope), self.experiment.films
         finished = (
-            (sign, after_film_effects(film_um, stages.effects, points))
+            (sign, after_film_effects(film_um, stages.finishing, points))
             for (sign, _), film_um in zip(films, films_um.reshape(len(films), -1), strict=True)
         )
-        reading = gauge_reading_um(sum_um(finished), stages.effects, points)
+        reading = gauge_reading_um(sum_um(finished), stages.finishing, points)
         return reading[: len(self.experiment)]
 
     def _integrated_um(self, model: DepositionModel, slope: bool) -> np.ndarray:
