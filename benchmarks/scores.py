@@ -96,7 +96,8 @@ def calibration(records: list[Record]) -> list[Row | str]:
     ):
         error, count = expected_calibration_error(chosen)
         aim = '<= 0.05' if label[0] != ' ' else ''
-        rows.append(f'{label:<{WIDTH}}{error:6.3f}{"":<20}{count} groups     {aim}'.rstrip())
+        chance = f'by chance {error_by_chance(chosen):.3f}'
+        rows.append(f'{label:<{WIDTH}}{error:6.3f}  {chance:<18}{count} groups     {aim}'.rstrip())
         sure = [(c, right) for c, p, right in stated(chosen) if p >= SURE]
         rows.append(Row(f'{label[: len(label) - len(label.lstrip())]}  said with {SURE} and right',
                         sure, '>= 93'))  # fmt: skip
@@ -130,6 +131,18 @@ def expected_calibration_error(records: list[Record]) -> tuple[float, int]:
             apart = np.mean([p for _, p, _ in chosen]) - np.mean([right for *_, right in chosen])
             total, count = total + abs(apart) * len(chosen), count + len(chosen)
     return (total / count if count else float('nan')), count
+
+
+def error_by_chance(records: list[Record]) -> float:
+    """The calibration error that as many groups have on average where what is said is true."""
+    rng, apart, count = np.random.default_rng(0), 0.0, 0
+    for _, _, chosen in bins(records):
+        if chosen:
+            said = np.array([probability for _, probability, _ in chosen])
+            right = rng.random((RESAMPLED, len(said))) < said
+            apart += len(said) * np.abs(right.mean(axis=1) - said.mean()).mean()
+            count += len(said)
+    return apart / count if count else float('nan')
 
 
 def false_alarms(records: list[Record]) -> list[Row]:

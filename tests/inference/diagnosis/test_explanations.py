@@ -13,6 +13,7 @@ from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.files.effect_trial import COVARIATES
 from paint_deposition.inference.diagnosis import explanations
 from paint_deposition.inference.diagnosis.closed_forms import fitting_forms, forms_of
+from paint_deposition.inference.fitting.least_squares import derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 
@@ -27,9 +28,13 @@ def study() -> Study:
 def errors(
     study: Study, *effects: Effect, kept: tuple[str, ...] | None = None, of=explanations.law_errors
 ) -> np.ndarray:
-    """(P, n) of a model with these effects, of which all or some are kept."""
+    """(P, n) of a model with these effects, of which all or some are kept.
+
+    Its pattern is known exactly: it follows nothing.
+    """
     model = MODEL.model_copy(update={'effects': effects})
-    fit = replace(linear_fit(np.random.default_rng(0), len(study)), model=model)
+    fit = linear_fit(np.random.default_rng(0), len(study))
+    fit = replace(fit, model=model, jacobian=np.zeros_like(fit.jacobian))
     ids = [effect.id for effect in effects] if kept is None else kept
     return of(study, fit, frozenset(ids), fit.model)
 
@@ -67,6 +72,27 @@ def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(stud
     assert size(errors(study, effect)) == pytest.approx(expected, rel=0.03)
     other_form = size(errors(study, effect, of=another_form))
     assert other_form == pytest.approx(explanations.OTHER_LAW * share, rel=0.03)
+
+
+def test_over_conditions_of_others_what_the_pattern_would_follow_is_no_error_of_a_law(study):
+    """Attraction by the incidence acts on all film, and shows little beside another pattern."""
+    effect = EFFECTS['incidence_attraction'](attraction=0.8)
+    fit = study.fit(FreeParameters.of(MODEL))
+    jacobian = derivatives(study.forward, fit.parameters, fit.vector, study.sigma_um)
+    fit = replace(fit, model=MODEL.with_effect(effect))
+    change = change_um(study, effect) / study.sigma_um
+
+    def variance(jacobian: np.ndarray) -> np.ndarray:
+        pattern = replace(fit, jacobian=jacobian)
+        errors = explanations.law_errors(study, pattern, frozenset([effect.id]), fit.model)
+        return size(errors) ** 2
+
+    followed_by_none = variance(np.zeros_like(jacobian))
+    followed_wholly = variance(1e3 * change[:, np.newaxis] * np.eye(1, jacobian.shape[1]))
+    over_others = (explanations.OTHER_ERROR * change) ** 2
+    assert followed_by_none - followed_wholly == pytest.approx(over_others, rel=0.05)
+    followed = np.sum(followed_by_none - variance(jacobian))
+    assert 0.85 * np.sum(over_others) < followed < np.sum(over_others)
 
 
 @pytest.mark.parametrize('effect', [e for e in EFFECTS.values() if e.exact], ids=lambda e: e.id)

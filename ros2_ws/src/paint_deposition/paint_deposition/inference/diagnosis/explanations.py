@@ -304,10 +304,13 @@ def _off_anywhere(
 ) -> Iterator[np.ndarray]:
     """(P, n) what laws may be off by, relative to their change of the film [um].
 
-    Over the covariates that are the effect's own, or over all others.
+    Over the covariates that are the effect's own; or over all others, there relative to what no
+    pattern would follow, lest an effect that acts on all film stand for anything.
     """
     covariates = standardised(study, model)
     for effect, change in _changes(study, fit, kept):
+        if not own:
+            change = _beyond_pattern(study, fit, change)
         over = [name for name in covariates if (name in effect.covariates) == own]
         for name in over:
             root = root_of_field(covariates[name], LAW_LENGTH, NEGLIGIBLE)
@@ -330,6 +333,22 @@ def _changes(study: Study, fit: Fit, kept: frozenset[str]) -> Iterator[tuple[Eff
         others = tuple(e for e in fit.model.effects if e.id != effect.id)
         without = fit.model.model_copy(update={'effects': others})
         yield effect, film - study.forward.predict_um(without)
+
+
+def _beyond_pattern(study: Study, fit: Fit, change_um: np.ndarray) -> np.ndarray:
+    """(P,) what is left of a change of the readings (P,) that the pattern follows [um].
+
+    Attraction by the incidence, say, acts on all film, and hardly shows beside another pattern.
+    """
+    # Of the readings and of the prior, which holds the pattern where it is.
+    pattern = np.vstack([fit.jacobian, fit.parameters.prior.whitening])
+    pattern = pattern[:, : len(fit.parameters.pattern)]
+    change = np.zeros(len(pattern))
+    change[: len(study)] = change_um / study.sigma_um
+    left = change - pattern @ np.linalg.lstsq(pattern, change, rcond=None)[0]
+    # No law is off where it does not act.
+    most_um = np.abs(change_um)
+    return np.clip(study.sigma_um * left[: len(study)], -most_um, most_um)
 
 
 def _laws_off(
