@@ -159,7 +159,6 @@ class Effect(BaseModel):
         return cls(**{name: described['typical'] for name, described in cls.parameters().items()})
 
     @classmethod
-    @cache
     def parameters(cls) -> dict[str, dict[str, Any]]:
         """Unit, bounds, neutral and typical value and role of each parameter by name."""
         return {
