@@ -9,7 +9,7 @@ from numba import float32, njit
 import booth
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
-from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.files.effect_file import read_effect_file
 from paint_deposition.files.effect_trial import problem_in_words
 from paint_deposition.film.integrator import FilmIntegrator

@@ -9,8 +9,8 @@ from numba import float32, float64, njit
 
 from booth import MODEL, door, painted, panel, path_of, serpentine, spot
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
-from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, along_path, at_points
-from paint_deposition.effects.learned.law import (
+from paint_deposition.effects.learned_curves import CURVES, LearnedCurve, along_path, at_points
+from paint_deposition.effects.learned_laws import (
     WAVES,
     LearnedFootprint,
     LearnedMap,

@@ -10,7 +10,7 @@ from inference.diagnosis.linear import linear_fit, null_of
 from inference.diagnosis.readings_on_door import at_model
 from inference.fitting.panels import ORDERS, gauged, reading
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
-from paint_deposition.effects.learned.law import hat_weights
+from paint_deposition.effects.learned_laws import hat_weights
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.diagnosis import learning
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation

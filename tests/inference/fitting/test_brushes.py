@@ -14,10 +14,9 @@ from inference.fitting.panels import column, painted_by, passes
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.inference.fitting.calibration import brush_figures
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.inference.fitting.posterior import of_brushes, with_brushes_of
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PATTERN, Brush, PlanarPattern
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import LEARNED
-from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.film.integrator import FilmIntegrator

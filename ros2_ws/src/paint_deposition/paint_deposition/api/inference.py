@@ -25,8 +25,8 @@ from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.calibration import calibrate as calibrated
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.panel import short_reaches
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.posterior import of_brushes, with_brushes_of
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import require_paint
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory

@@ -18,8 +18,8 @@ from paint_deposition.film.statistics import film_statistics, require_band
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.plausibility import readings_in_doubt
 from paint_deposition.inference.readings.readings import Readings
-from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import checked_path
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, PoseCounts, Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, toward_the_guns

@@ -12,8 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from paint_deposition.kernel.laws import Ray as Ray
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path import SprayPath as SprayPath
-from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.points import SurfacePoints as SurfacePoints
+from paint_deposition.part.points import across_axis, downhill_axis
 
 # Curvature at which the effects of curvature have their full amplitude: a radius of 250 mm.
 REFERENCE_CURVATURE_PER_M = 1.0 / 0.250

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect, PathContext
-from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.errors import did_you_mean
 from paint_deposition.kernel.compiler import njit
 from paint_deposition.kernel.laws import Ray, in_precision

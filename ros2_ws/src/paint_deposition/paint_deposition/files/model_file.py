@@ -15,12 +15,12 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class, learned_law
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError, quoted
 from paint_deposition.files.atomic import plain, read_yaml, write_text
 from paint_deposition.files.effect_file import load_effect_file
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.model.eq1_pattern import MOST, Brush, PlanarPattern, SetPoints
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.request import validate

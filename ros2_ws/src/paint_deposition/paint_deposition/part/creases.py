@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, dot, length
+from paint_deposition.kernel.fast_math import cross, difference, dot, length
 from paint_deposition.part.edges import (
     BLOCK,
     Edges,

@@ -7,7 +7,7 @@ import scipy
 
 from paint_deposition.kernel.blocks import shared_among_threads
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, dot, length
+from paint_deposition.kernel.fast_math import cross, difference, dot, length
 from paint_deposition.part.creases import RIM_FOLD_RAD
 from paint_deposition.part.edges import near_pairs, rows_by_number
 from paint_deposition.part.refinement import face_areas_m2, face_normals

@@ -10,7 +10,7 @@ import numpy as np
 
 from paint_deposition.kernel.blocks import bounding_box_m
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, dot, length
+from paint_deposition.kernel.fast_math import cross, difference, dot, length
 
 # Faces in a leaf of the tree.
 LEAF = 8

@@ -7,7 +7,7 @@ import numpy as np
 
 from paint_deposition.errors import MeshError
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, length
+from paint_deposition.kernel.fast_math import cross, difference, length
 from paint_deposition.part.edges import edges_of
 
 

@@ -17,14 +17,16 @@ from paint_deposition.part import creases, derivatives
 from paint_deposition.part.creases import NO_EDGES, CurvedEdges
 from paint_deposition.part.edges import Edges, edge_distance_m
 from paint_deposition.part.face_tree import FaceTree, Location, first_hits, locate
-from paint_deposition.part.orientation import (
+from paint_deposition.part.points import (
     CANCELLED,
     ONE_SIDED,
+    SurfacePoints,
+    box_extent_m,
     gravity,
+    heights,
     mean_normal,
     outward_side,
 )
-from paint_deposition.part.points import SurfacePoints, box_extent_m, heights
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, face_normals, refine
 from paint_deposition.part.visibility import Occluder
 

@@ -11,7 +11,7 @@ from embreex.rtcore_scene import EmbreeScene
 
 from paint_deposition.kernel.blocks import box_centre_m, shared_among_threads
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, dot
+from paint_deposition.kernel.fast_math import cross, difference, dot
 from paint_deposition.part.derivatives import tangents
 from paint_deposition.part.face_tree import (
     DEPTH,

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.effects.learned.curves import LearnedCurve, counted_from_1
-from paint_deposition.effects.learned.law import (
+from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
+from paint_deposition.effects.learned_laws import (
     LEAST_FACTOR,
     LearnedFootprint,
     LearnedMap,

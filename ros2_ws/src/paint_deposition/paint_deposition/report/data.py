@@ -10,8 +10,8 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import LearnedCurve, counted_from_1
-from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap
+from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
+from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedLaw, LearnedMap
 from paint_deposition.film.common_film import sum_um
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import wanted_at

@@ -15,7 +15,7 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import STENCIL_M, Experiment
 from paint_deposition.inference.readings.places import FEWEST_ON_A_LINE, passes_are_level
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.orientation import STANDING_COSINE, across_axis, downhill_axis
+from paint_deposition.part.points import STANDING_COSINE, across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 

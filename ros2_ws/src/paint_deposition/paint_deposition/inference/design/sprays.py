@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.orientation import across_axis
+from paint_deposition.part.points import across_axis
 
 # The gun opens this much earlier and closes this much later than it did [s].
 LONGER_OPEN_S = 0.3

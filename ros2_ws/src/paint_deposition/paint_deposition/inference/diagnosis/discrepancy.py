@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import HARMONICS, WAVES
+from paint_deposition.effects.learned_laws import HARMONICS, WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.smooth_laws import (
     RandomLaw,

@@ -13,8 +13,8 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.effects.learned.law import LearnedFootprint, LearnedMap
+from paint_deposition.effects.learned_curves import CURVES
+from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedMap
 from paint_deposition.inference.diagnosis.discrepancy import Footprints
 from paint_deposition.inference.diagnosis.smooth_laws import (
     NEGLIGIBLE,

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import expit
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.learned.law import WAVES
+from paint_deposition.effects.learned_laws import WAVES
 from paint_deposition.inference.diagnosis.discrepancy import (
     PRIOR,
     DiscrepancyHyperparameters,

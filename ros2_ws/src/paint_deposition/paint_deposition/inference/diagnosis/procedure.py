@@ -29,12 +29,12 @@ from paint_deposition.inference.diagnosis.learning import (
     choose_laws,
     locate_unexplained,
 )
+from paint_deposition.inference.diagnosis.proposals import testability
 from paint_deposition.inference.diagnosis.search import EffectSet, Group, Search, SearchStage
 from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
-from paint_deposition.inference.diagnosis.testability import testability
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
 

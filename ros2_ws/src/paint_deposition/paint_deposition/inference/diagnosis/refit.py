@@ -9,7 +9,7 @@ from scipy.special import expit, logsumexp
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.errors import ModelError
 from paint_deposition.inference.diagnosis.explanations import (
     ADDITION_UM,
@@ -26,7 +26,7 @@ from paint_deposition.inference.diagnosis.smooth_laws import bases_over
 from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.inference.fitting.least_squares import on_one_thread
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
 

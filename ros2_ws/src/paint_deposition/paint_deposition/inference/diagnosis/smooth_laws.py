@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, knot_positions
-from paint_deposition.effects.learned.law import (
+from paint_deposition.effects.learned_curves import CURVES, LearnedCurve, knot_positions
+from paint_deposition.effects.learned_laws import (
     WAVES,
     LearnedFootprint,
     LearnedLaw,

@@ -13,14 +13,14 @@ from scipy.special import fdtr
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.inference.diagnosis.explanations import (
     Explanation,
     candidates_beside,
     nonparametric_laws_of,
     of_places,
 )
-from paint_deposition.inference.diagnosis.testability import Testability
+from paint_deposition.inference.diagnosis.proposals import Testability
 from paint_deposition.inference.diagnosis.verdict import (
     Diagnosis,
     EffectClass,
@@ -32,10 +32,9 @@ from paint_deposition.inference.diagnosis.verdict import (
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, estimates
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.posterior import prior_for
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
 # Starts of the first fit.

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
@@ -17,10 +17,10 @@ from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.panel import Panel
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.posterior import PatternShift, posterior_of
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
 from paint_deposition.tabular import Tabular
 

@@ -33,10 +33,9 @@ from paint_deposition.inference.fitting.panel import (
     shifts,
     short_reaches,
 )
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.posterior import posterior_of, with_brushes_of
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import (
     FEWEST_POINTS,

@@ -28,7 +28,7 @@ from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.plausibility import check_unit
 from paint_deposition.kernel.blocks import box_centre_m
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.points import across_axis, downhill_axis
 
 # Prior probability that a campaign has a mistake of a kind, shared by all hypotheses of the kind.
 PRIOR_PROBABILITY = {'mirrored': 1e-3, 'exchanged': 1e-3, 'unit': 0.01, 'gun': 0.01}

@@ -13,14 +13,13 @@ from scipy.special import chdtri
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import LearnedCurve
-from paint_deposition.effects.learned.law import LearnedFootprint
+from paint_deposition.effects.learned_curves import LearnedCurve
+from paint_deposition.effects.learned_laws import LearnedFootprint
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, scaled_covariance
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.model.eq1_pattern import Brush, SetPoints, listed
 from paint_deposition.motion.trajectory import ONLY_BRUSH

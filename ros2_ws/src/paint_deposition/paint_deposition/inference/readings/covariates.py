@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import along_path, at_points
+from paint_deposition.effects.learned_curves import along_path, at_points
 from paint_deposition.inference.readings.campaign import Experiment
 
 

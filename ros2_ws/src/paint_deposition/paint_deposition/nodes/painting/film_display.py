@@ -24,7 +24,7 @@ from paint_deposition.film.statistics import FIGURES, FilmStatistics, film_stati
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.topics import ColouredMesh, gun_topic, header, white_marker
-from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.points import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.report.colour_scales import TABLE, ColourScale, film_scale

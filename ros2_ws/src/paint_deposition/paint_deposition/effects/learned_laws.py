@@ -14,8 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.kernel.laws import Ray
-from paint_deposition.part.orientation import across_axis, downhill_axis
-from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.points import SurfacePoints, across_axis, downhill_axis
 
 # A factor never takes more than all but this share of the film away.
 LEAST_FACTOR = 0.05

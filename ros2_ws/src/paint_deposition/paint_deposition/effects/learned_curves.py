@@ -9,7 +9,7 @@ from numba.extending import register_jitable
 from pydantic import Field, model_validator
 
 from paint_deposition.effects.base import PathContext
-from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw, applied, places_m
+from paint_deposition.effects.learned_laws import LEAST_FACTOR, LearnedLaw, applied, places_m
 from paint_deposition.kernel.laws import Ray
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
