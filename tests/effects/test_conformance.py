@@ -162,7 +162,7 @@ def test_a_stream_paints_what_the_recording_does(effect: type[Effect]):
     for piece in booth.in_batches(trajectory, 7, model.needs_whole_strokes):
         live.add(piece)
     assert np.array_equal(live.gauge_um, whole.gauge_um)
-    assert live.emitted_cm3 == pytest.approx(whole.emitted_cm3, rel=1e-12)
+    assert live.used.emitted_cm3 == pytest.approx(whole.used.emitted_cm3, rel=1e-12)
 
 
 @EFFECT

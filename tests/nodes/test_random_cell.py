@@ -115,8 +115,10 @@ class Cell(RuleBasedStateMachine):
         self.meshes = [str(narrow), str(wide)]
         models = (
             two_brushes(),
-            DepositionModel.of_brushes(
-                Brush(number=n, planar=p) for n, p in zip(BRUSHES, (WIDE, NARROW), strict=True)
+            DepositionModel(
+                brushes=[
+                    Brush(number=n, planar=p) for n, p in zip(BRUSHES, (WIDE, NARROW), strict=True)
+                ]
             ),
         )
         self.models = [str(self.folder / f'{name}.yaml') for name in 'ab']

@@ -189,5 +189,4 @@ class Effect(BaseModel):
 
     def values(self) -> tuple[float, ...]:
         """Parameter values in the order declared."""
-        own = (name for name in type(self).model_fields if name not in Effect.model_fields)
-        return tuple(float(getattr(self, name)) for name in own)
+        return tuple(float(getattr(self, name)) for name in self.parameters())

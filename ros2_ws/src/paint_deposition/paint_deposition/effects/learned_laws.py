@@ -7,6 +7,7 @@ of an embedded discrepancy, inferred inside the model and shown against a physic
 """
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -50,6 +51,7 @@ class LearnedLaw(Effect):
         return self
 
     @classmethod
+    @cache
     def parameters(cls) -> dict[str, dict[str, Any]]:
         """None: a fit does not vary the law; it is learned by its own step."""
         return {}

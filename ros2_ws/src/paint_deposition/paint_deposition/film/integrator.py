@@ -190,13 +190,11 @@ class FilmIntegrator:
             constants.astype(self._real), self._parameters,
         )  # fmt: skip
         kernel = compile_kernel(*self._variant, separate_terms)
-
-        def paint(first_block: int, last_block: int) -> None:
-            kernel(first_block, last_block, *arguments)
-
         many = self._parallel and len(steps) * len(self._film) >= FEW_RAYS
         count = len(blocks.spheres)
-        shared_among_threads(count, paint, least_share=1 if many else count)
+        shared_among_threads(
+            count, lambda first, last: kernel(first, last, *arguments), 1 if many else count
+        )
 
     def _in_order(self, values: np.ndarray) -> np.ndarray:
         """Values (..., V) of the sorted points in the order of the caller's."""
@@ -204,11 +202,6 @@ class FilmIntegrator:
         sorted_back[..., self._blocks.order] = values
         sorted_back.flags.writeable = False  # one film is read by many
         return sorted_back
-
-    @property
-    def emitted_cm3(self) -> float:
-        """Solids that a part which catches everything would get [cm3]."""
-        return self.used.emitted_cm3
 
     @property
     def raw_um(self) -> np.ndarray:

@@ -280,7 +280,7 @@ def brush_figures(model: DepositionModel, parameters: Sequence[Estimate]) -> dic
         name = f'brush_{brush.number}.K1_cm3_per_s' if several else 'K1_cm3_per_s'
         known = not math.isnan(share)
         by_number[str(brush.number)] = {
-            **brush.set_points.model_dump(exclude_none=True),
+            **brush.model_dump(exclude={'number', 'planar'}, exclude_none=True),
             'transfer_efficiency': share if known else None,
             'transfer_efficiency_sigma': share * relative[name] if known else None,
         }

@@ -182,7 +182,9 @@ class FilmDisplay:
         node, values = self._node, self._node.values
         self._version += 1
         self._film_um = film.film_um
-        figures = statistics_of(values, node.surface, self._film_um, film.emitted_cm3, node.zones)
+        figures = statistics_of(
+            values, node.surface, self._film_um, film.used.emitted_cm3, node.zones
+        )
         laid_cm3 = volume_by_gun(node.gun_names, node.surface, film)
         self._stats = ThicknessStats(
             header=at,
