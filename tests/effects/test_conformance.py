@@ -13,7 +13,7 @@ from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.files.effect_file import read_effect_file
 from paint_deposition.files.effect_trial import problem_in_words
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.kernel.laws import Ray, in_precision
+from paint_deposition.kernel.eq2_flux import Ray, in_precision
 from reference import reference_film_um
 
 ALL = [*EFFECTS.values(), read_effect_file(booth.SAMPLES / 'my_effect.py')]

@@ -19,7 +19,7 @@ from paint_deposition.effects.learned_laws import (
 )
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import collapse_um
-from paint_deposition.kernel.laws import Ray, in_precision
+from paint_deposition.kernel.eq2_flux import Ray, in_precision
 from paint_deposition.part.points import SurfacePoints
 from reference import reference_film_um
 

@@ -18,7 +18,6 @@ from paint_deposition.inference.fitting.outliers import (
     Outlier,
     find_outliers,
 )
-from paint_deposition.inference.readings.covariates import Covariate
 from paint_deposition.report.words import count_words
 from small_campaign import small_campaign
 
@@ -38,13 +37,13 @@ def scattered(seed: int, texture: float = 0.005) -> FittedPoints:
     film = np.full(COUNT, FILM_UM)
     return FittedPoints(
         noise, film, np.full(COUNT, GAUGE_UM), film[:, np.newaxis], np.zeros(COUNT, dtype=int),
-        positions, tuple(Covariate(name, values) for name, values in along.items()),
+        positions, along,
     )  # fmt: skip
 
 
 def built_up(misfit: FittedPoints) -> FittedPoints:
     """The same with half as much film again at the edge, falling off within 20 mm."""
-    distance_m = misfit.covariates[0].values
+    distance_m = misfit.covariates['edge_distance_m']
     more = 0.5 * FILM_UM * np.exp(-distance_m / 0.02)
     return replace(misfit, residual_um=misfit.residual_um + more)
 
@@ -70,7 +69,7 @@ def test_sound_readings_are_kept_whatever_is_missing(missing):
 @pytest.mark.parametrize('by_um', [9.0 * FILM_UM, -0.9 * FILM_UM, 12.0 * GAUGE_UM])
 def test_a_slip_is_found_whatever_is_missing(missing, by_um):
     misfit = missing(scattered(0))
-    row = int(np.argmax(misfit.covariates[0].values))  # well inside the sheet
+    row = int(np.argmax(misfit.covariates['edge_distance_m']))  # well inside the sheet
     assert list(find_outliers(slipped(misfit, row, by_um), EVERY)) == [row]
 
 

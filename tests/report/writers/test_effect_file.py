@@ -20,7 +20,7 @@ from paint_deposition.inference.diagnosis import closed_forms
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.fitting.estimates import estimates
-from paint_deposition.kernel.laws import Ray
+from paint_deposition.kernel.eq2_flux import Ray
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.report.writers.inference import (
     effect_entry,

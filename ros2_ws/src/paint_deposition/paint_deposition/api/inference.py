@@ -176,7 +176,7 @@ def refit(
 
 def _about(found: Diagnosis) -> tuple[str, ...]:
     """What is simply wrong with the data and does not stop the diagnosis, which would say it."""
-    return tuple(mistake.sentence for mistake in found.study.mistakes if not mistake.stops)
+    return tuple(sentence for sentence, stops in found.study.mistakes if not stops)
 
 
 def _start(

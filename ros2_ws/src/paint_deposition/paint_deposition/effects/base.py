@@ -9,7 +9,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from paint_deposition.kernel.laws import Ray as Ray
+from paint_deposition.kernel.eq2_flux import Ray as Ray
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path import SprayPath as SprayPath
 from paint_deposition.part.points import SurfacePoints as SurfacePoints

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from paint_deposition.effects.base import PathContext
 from paint_deposition.effects.learned_laws import LEAST_FACTOR, LearnedLaw, applied, places_m
-from paint_deposition.kernel.laws import Ray
+from paint_deposition.kernel.eq2_flux import Ray
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 

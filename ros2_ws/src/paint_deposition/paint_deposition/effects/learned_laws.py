@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.kernel.laws import Ray
+from paint_deposition.kernel.eq2_flux import Ray
 from paint_deposition.part.points import SurfacePoints, across_axis, downhill_axis
 
 # A factor never takes more than all but this share of the film away.

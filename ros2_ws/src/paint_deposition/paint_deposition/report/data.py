@@ -182,7 +182,9 @@ class ReportData:
                     film.add(one.path.select(rows))
                     films.append((sign, film))
                 film_um = sum_um((sign, film.film_um) for sign, film in films)
-                of_part.append((film_um, sum(sign * film.emitted_cm3 for sign, film in films)))
+                of_part.append(
+                    (film_um, sum(sign * film.used.emitted_cm3 for sign, film in films))
+                )
             found.append(of_part)
         return found
 

@@ -303,5 +303,5 @@ def design_at(part: UnmeasuredPart, vertices: np.ndarray) -> CandidateDesign:
     return CandidateDesign(
         fit.jacobian @ fit.parameters.prior.factor,
         np.hstack([law.columns for law in laws]),
-        np.array([law.id for law in laws for _ in law.names]),
+        np.array([law.effect.id for law in laws for _ in law.names]),
     )

@@ -108,10 +108,6 @@ def _moved_off(distance_m: float) -> Callable[[Experiment], Experiment | None]:
     return moved
 
 
-def _flow(factor: float) -> Callable[[Experiment], Experiment]:
-    return _on_path(lambda path: path.with_flow_scaled(factor))
-
-
 def _speed(factor: float) -> Callable[[SprayPath], SprayPath]:
     def changed(path: SprayPath) -> SprayPath:
         times = ('time_s', 'dwell_s', 'since_on_s', 'since_off_s', 'until_on_s', 'until_off_s')
@@ -188,8 +184,13 @@ MENU = (
     Change('other_way', 'each run the other way', _on_path(_other_way), 'way'),
     Change('further', '60 mm further off', _moved_off(0.06), 'standoff'),
     Change('closer', '60 mm closer', _moved_off(-0.06), 'standoff'),
-    Change('half_flow', 'at half the flow', _flow(0.5), 'film'),
-    Change('double_flow', 'at twice the flow', _flow(2.0), 'film'),
+    Change(
+        'half_flow', 'at half the flow', _on_path(lambda path: path.with_flow_scaled(0.5)), 'film'
+    ),
+    Change(
+        'double_flow', 'at twice the flow', _on_path(lambda path: path.with_flow_scaled(2.0)),
+        'film',
+    ),
     Change('half_speed', 'at half the speed', _on_path(_speed(0.5)), 'film'),
     Change('double_speed', 'at twice the speed', _on_path(_speed(2.0)), 'film'),
     Change(

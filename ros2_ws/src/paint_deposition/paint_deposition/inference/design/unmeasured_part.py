@@ -105,5 +105,5 @@ class UnmeasuredPart:
                 strength = float(np.linalg.norm(column))
                 direction = (-column if side < 0.0 else column) / max(strength, 1e-12)
                 chance = power_along(space, direction, np.array([strength]), null, draws)[0]
-                found.setdefault(law.id, []).append(float(chance))
+                found.setdefault(law.effect.id, []).append(float(chance))
         return {name: float(np.mean(chances)) for name, chances in sorted(found.items())}

@@ -27,6 +27,7 @@ from paint_deposition.inference.diagnosis.search import EffectSet, SearchStage
 from paint_deposition.inference.diagnosis.verdict import Unknown
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.covariates import varies
 
 MOST_LAWS = 2
 # Share by which a law must lower the error on readings left out.
@@ -221,7 +222,6 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     The p-value is that of the maximum over all covariates if sprays differed as usual ones do.
 
     Args:
-        study: the readings.
         fit: the model so far.
         nothing: whose discrepancy is that of the sprays.
         seed: of the simulated deviations.
@@ -230,19 +230,21 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     null = NullModel.around(fit, study.nuisance, discrepancy=usual)
     draws = simulated(len(study), study.noise.degrees_of_freedom, DRAWS, seed)
     found, by_chance = [], np.zeros(DRAWS)
-    for covariate in filter(lambda c: c.varies, study.covariates(fit.model)):
-        smooth = _smooth(covariate.values) / study.sigma_um[:, np.newaxis]
+    covariates = study.covariates(fit.model)
+    for name in (name for name, values in covariates.items() if varies(values)):
+        smooth = _smooth(covariates[name]) / study.sigma_um[:, np.newaxis]
         directions, _ = np.linalg.qr(null.whiten(smooth))
-        found.append((float(np.sum((directions.T @ null.deviation) ** 2)), covariate))
+        found.append((float(np.sum((directions.T @ null.deviation) ** 2)), name))
         by_chance = np.maximum(by_chance, np.sum((directions.T @ draws) ** 2, axis=0))
     strength, covariate = max(found, key=lambda item: item[0])
-    smooth = np.column_stack([np.ones(len(study)), _smooth(covariate.values)])
+    values = covariates[covariate]
+    smooth = np.column_stack([np.ones(len(study)), _smooth(values)])
     weights = 1.0 / study.sigma_um[:, np.newaxis]
     residuals = study.residuals(fit.predicted_um)
     coefficients, *_ = np.linalg.lstsq(
         smooth * weights, residuals.residual_um / study.sigma_um, rcond=None
     )
-    order = np.argsort(covariate.values)
+    order = np.argsort(values)
     points = order[np.linspace(0, len(order) - 1, 15).astype(int)]
     regions = misfit_regions(study, residuals, fit.model)
     names = [experiment.name for experiment in study.campaign.experiments]
@@ -251,10 +253,10 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     first = max(regions, key=lambda region: abs(region.mean_residual_um), default=None)
     mean_um = float(np.mean(study.measured_um[first.rows])) if first else np.nan
     return Unknown(
-        covariate.name,
+        covariate,
         float((1 + np.count_nonzero(by_chance >= strength)) / (1 + DRAWS)),
         {
-            covariate.name: covariate.values[points].tolist(),
+            covariate: values[points].tolist(),
             'residual_um': (smooth[points] @ coefficients).tolist(),
         },
         first.description if first else 'no single place stands out',

@@ -257,7 +257,7 @@ def intervals(fit: Fit, effect_id: str) -> dict[str, Interval]:
 
 def trouble_with(study: Study, fit: Fit) -> str:
     """Why the fit cannot be right, '' if it can."""
-    if wrong := [mistake.sentence for mistake in study.mistakes if mistake.stops]:
+    if wrong := [sentence for sentence, stops in study.mistakes if stops]:
         return '; '.join(wrong)
     mean = float(np.mean(study.measured_um))
     # So many standard deviations above the prediction the gauge found paint; below this share of

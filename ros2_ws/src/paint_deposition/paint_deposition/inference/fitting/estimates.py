@@ -38,8 +38,13 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
     # A parameter was measured if its width has fallen below this share of its weak prior's.
     learned = np.sqrt(np.diag(covariance)) <= 0.5 * fit.parameters.weak_prior.width
     values = fit.parameters.values(fit.vector[np.newaxis])[0]
-    low, high = _intervals(fit, covariance, values)
     pattern, found = fit.parameters.pattern, []
+    random = np.random.default_rng(0)
+    vectors = random.multivariate_normal(fit.vector, covariance, 4000, method='cholesky')
+    inside = np.clip(vectors, *fit.parameters.bounds)
+    away = _around_phase(fit.parameters.values(inside), values, pattern)
+    # Ends of the 95 % intervals.
+    low, high = values + np.quantile(away, (0.025, 0.975), axis=0)
     for k, name in enumerate(_names(fit)):
         row, place = divmod(k, len(PATTERN_NAMES))
         if row < pattern.count:
@@ -103,18 +108,6 @@ def _spread(fit: Fit, covariance: np.ndarray) -> np.ndarray:
     change = _around_phase(parameters.values(up), parameters.values(down), parameters.pattern)
     by_vector = (change / (up - down).sum(axis=1, keepdims=True)).T
     return by_vector @ covariance @ by_vector.T
-
-
-def _intervals(
-    fit: Fit, covariance: np.ndarray, values: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """(k,) ends of the 95 % intervals."""
-    random = np.random.default_rng(0)
-    vectors = random.multivariate_normal(fit.vector, covariance, 4000, method='cholesky')
-    inside = np.clip(vectors, *fit.parameters.bounds)
-    away = _around_phase(fit.parameters.values(inside), values, fit.parameters.pattern)
-    low, high = np.quantile(away, (0.025, 0.975), axis=0)
-    return values + low, values + high
 
 
 def _pattern_reason(

@@ -170,7 +170,7 @@ def fitted_points(study: Study, fit: Fit) -> FittedPoints:
     return FittedPoints(
         fit.residual * study.sigma_um, fit.predicted_um, study.gauge_um,
         free * study.sigma_um[:, np.newaxis], study.campaign.experiment_of,
-        study.campaign.positions_m, tuple(study.covariates(fit.model)),
+        study.campaign.positions_m, study.covariates(fit.model),
     )  # fmt: skip
 
 
@@ -206,7 +206,7 @@ def find_mistakes(study: Study, fit: Fit, start: DepositionModel) -> tuple[Mista
             break
         if way.kind in PLACES and as_given.displaced.log_weight > best - LEAST_LOG_ODDS:
             break
-        found.append(Mistake(_sentence(way, as_given, meant), way.of_this_gun))
+        found.append((_sentence(way, as_given, meant), way.of_this_gun))
         as_given = meant
     return tuple(found)
 

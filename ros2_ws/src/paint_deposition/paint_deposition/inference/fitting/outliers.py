@@ -10,7 +10,7 @@ hyperparameters integrated over a grid). Each predicts every reading from all th
 closed form (Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006, section 5.4.2).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -21,7 +21,7 @@ from scipy.special import expit, logsumexp
 from scipy.stats import norm
 
 from paint_deposition.inference.fitting.random_effects import root_of_field
-from paint_deposition.inference.readings.covariates import Covariate
+from paint_deposition.inference.readings.covariates import varies
 
 # The film's texture, as a share of it: what is usual, within a factor of two, and what may be.
 USUAL_TEXTURE = 0.01
@@ -42,7 +42,7 @@ class FittedPoints:
     free_um: np.ndarray  # (P, n) directions in which the model may be off, for unit amplitudes
     experiment_of: np.ndarray  # (P,) part of each point
     positions_m: np.ndarray  # (P, 3)
-    covariates: tuple[Covariate, ...]  # of the points
+    covariates: Mapping[str, np.ndarray]  # (P,) each, by name
 
     @cached_property
     def leave_one_out(self) -> 'LeaveOneOut':
@@ -53,7 +53,7 @@ class FittedPoints:
         """Some of the readings."""
         names = [one.name for one in fields(self) if one.name != 'covariates']
         arrays: dict[str, Any] = {name: getattr(self, name)[rows] for name in names}
-        some = tuple(Covariate(c.name, c.values[rows]) for c in self.covariates)
+        some = {name: values[rows] for name, values in self.covariates.items()}
         return replace(self, covariates=some, **arrays)
 
 
@@ -126,7 +126,8 @@ def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
     apart = np.column_stack([misfit.positions_m, 1e6 * misfit.experiment_of])
     # Lengths of correlation: over the part [m], over a covariate in its standard deviations.
     over_part = [root_of_field(apart, length, NEGLIGIBLE) for length in (0.1, 0.25)]
-    scaled = [(c.values - c.values.mean()) / c.values.std() for c in misfit.covariates if c.varies]
+    differing = [values for values in misfit.covariates.values() if varies(values)]
+    scaled = [(values - values.mean()) / values.std() for values in differing]
     over = [root_of_field(values, 0.5, NEGLIGIBLE) for values in scaled]
     every = np.hstack([over_part[-1], *over])
     roots = [*over_part, *over, every]
