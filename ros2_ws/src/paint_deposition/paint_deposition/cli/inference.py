@@ -286,7 +286,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[s
     yield (
         f'RMSE {before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on '
         f'{diagnosis.left_out} held out, {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the '
-        f'fitted points; gauge and texture {diagnosis.noise_floor_um:.2f} µm'
+        f'fitted points; gauge and texture {diagnosis.study.noise_floor_um:.2f} µm'
     )
     yield from (zone.sentence for zone in diagnosis.comparisons[-1].zones)
     yield from (f'worse than before: {one}' for one in diagnosis.worse)

@@ -45,13 +45,6 @@ class Steps:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def of_brush(self, row: int) -> 'Steps':
-        """The sub-steps on which one of the patterns sprays."""
-        chosen = self.brush == row
-        return replace(
-            self, rows=self.rows[chosen], brush=self.brush[chosen], tracing=self.tracing[chosen]
-        )
-
 
 class FilmIntegrator:
     """Accumulates the film of a model on surface points as the path comes in.
@@ -152,7 +145,11 @@ class FilmIntegrator:
         constants, none = layout.term_constants(self.model), np.empty(0)
         terms = np.zeros((len(constants), TERMS, len(self._film)))
         for row, of_brush in enumerate(terms):
-            self._run(True, steps.of_brush(row), constants, none, none, of_brush)
+            on = steps.brush == row
+            own = replace(
+                steps, rows=steps.rows[on], brush=steps.brush[on], tracing=steps.tracing[on]
+            )
+            self._run(True, own, constants, none, none, of_brush)
         return self._in_order(terms.reshape(-1, len(self._film)))
 
     def sprayed(self, path: SprayPath) -> tuple[SprayPath, np.ndarray]:

@@ -326,7 +326,7 @@ def _alike(first: Experiment, second: Experiment) -> bool:
     if (first.switched_off, first.brushes) != (second.switched_off, second.brushes):
         return False
     extents = [np.round(e.measured_points.extent_m, 3) for e in (first, second)]
-    if not np.array_equal(*extents):
+    if not np.array_equal(extents[0], extents[1]):
         return False
     clocks = [np.cumsum(e.path.flow * e.path.dwell_s) for e in (first, second)]
     # Paths are the same that keep within a share of the time, a distance [m] and an angle [rad].

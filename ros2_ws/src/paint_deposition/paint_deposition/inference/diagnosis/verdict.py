@@ -251,11 +251,6 @@ class Diagnosis(Tabular):
         return posterior_of(step.fit, self.study.campaign, self.discrepancy)
 
     @property
-    def noise_floor_um(self) -> float:
-        """Standard deviation of the points: gauge, texture, and what facets cost [um]."""
-        return self.study.noise_floor_um
-
-    @property
     def model(self) -> DepositionModel:
         """The model with what was accepted."""
         return self.history[-1].model
@@ -274,6 +269,7 @@ class Diagnosis(Tabular):
         """The content of ``diagnosis.json``."""
         before, after = self.history[0], self.history[-1]
         predicted = before.fit.predicted_um, after.fit.predicted_um
+        noise_um = self.study.noise_floor_um
         places, sprays = self.proposals
         classes = []
         for found in self.classes:
@@ -292,9 +288,9 @@ class Diagnosis(Tabular):
                 'after': after.rmse_um,
                 'holdout_before': before.holdout_rmse_um,
                 'holdout_after': after.holdout_rmse_um,
-                'beyond_noise_before': before.beyond_noise_um(self.noise_floor_um),
-                'beyond_noise_after': after.beyond_noise_um(self.noise_floor_um),
-                'noise_floor': self.noise_floor_um,
+                'beyond_noise_before': before.beyond_noise_um(noise_um),
+                'beyond_noise_after': after.beyond_noise_um(noise_um),
+                'noise_floor': noise_um,
                 'left_out': 'experiments' if self.left_out == 'parts' else 'points',
             },
             'experiments': [

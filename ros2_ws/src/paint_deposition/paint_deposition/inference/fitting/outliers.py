@@ -47,7 +47,20 @@ class FittedPoints:
     @cached_property
     def leave_one_out(self) -> 'LeaveOneOut':
         """Leave-one-out predictions of the readings by all models."""
-        return LeaveOneOut.of(self)
+        log_prior = norm.logpdf(np.log(TEXTURES / USUAL_TEXTURE) / np.log(2.0))
+        found, residual = [], self.residual_um
+        for field, log_share in _fields(self):
+            directions = np.hstack([self.free_um, field])
+            for texture, log_texture in zip(TEXTURES, log_prior, strict=True):
+                variance = self.gauge_um**2 + (texture * self.predicted_um) ** 2
+                solved, log_det = _solved(variance, directions)
+                weighted = residual / variance - solved.T @ (solved @ residual)
+                diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
+                likelihood = float(-0.5 * (residual @ weighted + log_det))
+                mean, sigma = residual - weighted / diagonal, diagonal**-0.5
+                found.append((likelihood + log_share + log_texture, texture, mean, sigma))
+        log_weight, textures, mean, sigma = (np.array(of) for of in zip(*found, strict=True))
+        return LeaveOneOut(log_weight, textures, mean, sigma, residual)
 
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
@@ -66,24 +79,6 @@ class LeaveOneOut:
     expected_um: np.ndarray  # (M, P) residual that the other readings predict
     sigma_um: np.ndarray  # (M, P) standard deviation of that prediction
     residual_um: np.ndarray  # (P,)
-
-    @staticmethod
-    def of(misfit: FittedPoints) -> 'LeaveOneOut':
-        """Compute all models."""
-        log_prior = norm.logpdf(np.log(TEXTURES / USUAL_TEXTURE) / np.log(2.0))
-        found, residual = [], misfit.residual_um
-        for field, log_share in _fields(misfit):
-            directions = np.hstack([misfit.free_um, field])
-            for texture, log_texture in zip(TEXTURES, log_prior, strict=True):
-                variance = misfit.gauge_um**2 + (texture * misfit.predicted_um) ** 2
-                solved, log_det = _solved(variance, directions)
-                weighted = residual / variance - solved.T @ (solved @ residual)
-                diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
-                likelihood = float(-0.5 * (residual @ weighted + log_det))
-                mean, sigma = residual - weighted / diagonal, diagonal**-0.5
-                found.append((likelihood + log_share + log_texture, texture, mean, sigma))
-        log_weight, textures, mean, sigma = (np.array(of) for of in zip(*found, strict=True))
-        return LeaveOneOut(log_weight, textures, mean, sigma, misfit.residual_um)
 
     @property
     def texture_share(self) -> float:

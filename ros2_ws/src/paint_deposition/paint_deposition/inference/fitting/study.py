@@ -201,7 +201,7 @@ class Study:
 
     @property
     def noise_floor_um(self) -> float:
-        """Root mean square of the points' standard deviations [um]."""
+        """Root mean square of the points' standard deviations: gauge, texture, facets [um]."""
         return root_mean_square(self.sigma_um)
 
     @cached_property
