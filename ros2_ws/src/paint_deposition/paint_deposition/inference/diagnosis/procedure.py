@@ -25,9 +25,9 @@ from paint_deposition.inference.diagnosis.explanations import (
 )
 from paint_deposition.inference.diagnosis.learning import (
     LeftOut,
-    NullModels,
     choose_laws,
     locate_unexplained,
+    nulls_around,
 )
 from paint_deposition.inference.diagnosis.proposals import testability
 from paint_deposition.inference.diagnosis.search import EffectSet, Group, Search, SearchStage
@@ -150,7 +150,7 @@ def _learn(state: DiagnosisState, best: EffectSet, left_out: LeftOut) -> Diagnos
     A law that the model cannot be fitted with, or that makes a part worse, is not tried again.
     """
     without: frozenset[str] = frozenset()
-    nulls = NullModels.around(best, state.fit)
+    nulls = nulls_around(best, state.fit)
     while True:
         left = [option for option in left_out.options if option.learns not in without]
         laws = [(left[k], size) for k, size in choose_laws(nulls, left, state.freedom)]

@@ -82,7 +82,8 @@ def scaled_covariance(fit: Fit, shifts: np.ndarray | None = None) -> np.ndarray:
     deviations of their own directions.
     """
     data = fit.jacobian.T @ fit.jacobian / max(fit.chi_square_per_freedom, 1.0)
-    covariance = np.linalg.inv(data + fit.parameters.prior.precision)
+    whitening = fit.parameters.prior.whitening
+    covariance = np.linalg.inv(data + whitening.T @ whitening)
     return covariance if shifts is None else covariance + shifts.T @ shifts
 
 

@@ -146,11 +146,6 @@ class Prior:
         """(k, k) inverse of the factor."""
         return solve_triangular(self.factor, np.eye(len(self.factor)), lower=True)
 
-    @property
-    def precision(self) -> np.ndarray:
-        """(k, k) inverse covariance."""
-        return self.whitening.T @ self.whitening
-
     def whiten(self, vector: np.ndarray) -> np.ndarray:
         """(k,) deviations of a vector from the centre, independent and in standard deviations."""
         return self.whitening @ (vector - self.centre)
