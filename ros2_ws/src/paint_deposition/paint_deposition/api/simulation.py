@@ -240,10 +240,12 @@ def _painted(
     integrators = []
     before, steps = 0, sum(len(gun.path) for gun in seen)
     for gun, model in zip(seen, models, strict=True):
+
+        def report(done: int, before: int = before) -> None:
+            progress('painting', (before + done) / steps)
+
         integrators.append(FilmIntegrator(points, model, precision, surface.occluder))
-        integrators[-1].add(
-            gun.path, lambda done, before=before: progress('painting', (before + done) / steps)
-        )
+        integrators[-1].add(gun.path, report)
         before += len(gun.path)
     return CommonFilm(tuple(integrators))
 
