@@ -92,7 +92,7 @@ def test_a_point_that_was_read_again_is_no_slip():
 def test_a_prediction_without_the_reading_is_that_of_the_others_alone():
     """The closed form against a mixture that has never seen the reading."""
     # Without covariates, whose scale would be that of the readings.
-    misfit, row = replace(built_up(scattered(4)), covariates=()), 17
+    misfit, row = replace(built_up(scattered(4)), covariates={}), 17
     others = np.delete(np.arange(COUNT), row)
     whole, without = misfit.leave_one_out, misfit.select(others).leave_one_out
     joint = np.logaddexp.reduce(whole.log_weight) - np.logaddexp.reduce(without.log_weight)
