@@ -17,8 +17,8 @@ SET_POINTS = {
 def two_brushes(**rest) -> DepositionModel:
     """A narrow brush 1 and a wide brush 2."""
     patterns = {1: NARROW, 2: WIDE}
-    return DepositionModel.of_brushes(
-        (Brush(number=n, planar=p, **SET_POINTS[n]) for n, p in patterns.items()), **rest
+    return DepositionModel(
+        brushes=(Brush(number=n, planar=p, **SET_POINTS[n]) for n, p in patterns.items()), **rest
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.kernel.laws import Ray
+from paint_deposition.kernel.eq2_flux import Ray
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 

@@ -263,7 +263,7 @@ def test_a_model_is_varied_and_its_bounds_hold():
 
 
 def test_a_pattern_of_brushes_is_varied_brush_by_brush():
-    model = DepositionModel.of_brushes([Brush(number=k, planar=PlanarPattern()) for k in (1, 4)])
+    model = DepositionModel(brushes=[Brush(number=k, planar=PlanarPattern()) for k in (1, 4)])
     file = sweep_file.SweepFile.model_validate({'grid': {'brush_4.K1_cm3_per_s': [2.5]}})
     (values,) = sweep_file.variations(file, [model])
     first, other = sweep_file.varied_model(model, values).patterns

@@ -26,7 +26,7 @@ COATS = {
 LAYERS = ('base', 'clear', 'base+clear')
 # 0.5 and 0.25 of the paint are solids; the flow of the base coat is not known.
 TWO_PAINTS = [
-    pd.DepositionModel.of_brushes([Brush(number=1, planar=planar, solids=solids, **more)])
+    pd.DepositionModel(brushes=[Brush(number=1, planar=planar, solids=solids, **more)])
     for planar, solids, more in ((WIDE, 0.5, {}), (NARROW, 0.25, {'flow_cm3_per_min': 600.0}))
 ]
 

@@ -11,7 +11,7 @@ import paint_deposition as pd
 from cli.command import COARSE, assert_refused, figures_of, film_in, level_pass, paint, ran
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.transforms import Rigid
 
 # The part stands two metres before the robot, turned and leaning.
 PART_POSE = [2.1, -0.4, 0.9, *Rotation.from_euler('ZYX', [1.9, 0.3, -0.2]).as_quat().tolist()]

@@ -18,7 +18,7 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.motion.part_frame import Rigid, moved
+from paint_deposition.motion.transforms import Rigid, moved
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest
 

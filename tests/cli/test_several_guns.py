@@ -138,8 +138,10 @@ def test_guns_of_different_patterns_share_a_campaign_as_brushes(bags, surface, t
     entry = {'mesh': str(PANEL), 'measurements': 'film.csv', 'guns': guns, 'brush': 1}
     path = tmp_path / 'campaign.yaml'
     path.write_text(yaml.safe_dump({'experiments': [entry]}))
-    both = pd.DepositionModel.of_brushes(
-        Brush(number=number, planar=model.planar) for number, model in ((1, bell), (2, THIN))
+    both = pd.DepositionModel(
+        brushes=[
+            Brush(number=number, planar=model.planar) for number, model in ((1, bell), (2, THIN))
+        ]
     )
     assert pd.compare(pd.read_campaign(path), both).points.rmse_um < 1e-4
     # One pattern for both guns is not enough.

@@ -9,11 +9,11 @@ from numba import float32, njit
 import booth
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
-from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.files.effect_file import read_effect_file
 from paint_deposition.files.effect_trial import problem_in_words
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.kernel.laws import Ray, in_precision
+from paint_deposition.kernel.eq2_flux import Ray, in_precision
 from reference import reference_film_um
 
 ALL = [*EFFECTS.values(), read_effect_file(booth.SAMPLES / 'my_effect.py')]
@@ -162,7 +162,7 @@ def test_a_stream_paints_what_the_recording_does(effect: type[Effect]):
     for piece in booth.in_batches(trajectory, 7, model.needs_whole_strokes):
         live.add(piece)
     assert np.array_equal(live.gauge_um, whole.gauge_um)
-    assert live.emitted_cm3 == pytest.approx(whole.emitted_cm3, rel=1e-12)
+    assert live.used.emitted_cm3 == pytest.approx(whole.used.emitted_cm3, rel=1e-12)
 
 
 @EFFECT

@@ -9,8 +9,8 @@ from numba import float32, float64, njit
 
 from booth import MODEL, door, painted, panel, path_of, serpentine, spot
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
-from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, along_path, at_points
-from paint_deposition.effects.learned.law import (
+from paint_deposition.effects.learned_curves import CURVES, LearnedCurve, along_path, at_points
+from paint_deposition.effects.learned_laws import (
     WAVES,
     LearnedFootprint,
     LearnedMap,
@@ -19,7 +19,7 @@ from paint_deposition.effects.learned.law import (
 )
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import collapse_um
-from paint_deposition.kernel.laws import Ray, in_precision
+from paint_deposition.kernel.eq2_flux import Ray, in_precision
 from paint_deposition.part.points import SurfacePoints
 from reference import reference_film_um
 

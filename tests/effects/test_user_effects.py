@@ -18,7 +18,7 @@ from paint_deposition.effects.base import Effect, PathContext, SprayPath
 from paint_deposition.errors import ModelError
 from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.files.effect_trial import NEEDS, PLACES, TRIAL_RAYS
-from paint_deposition.kernel.laws import Ray, in_precision
+from paint_deposition.kernel.eq2_flux import Ray, in_precision
 
 SAMPLE = (SAMPLES / 'my_effect.py').read_text()
 
@@ -229,7 +229,7 @@ import sys
 from paint_deposition.effects.base import Ray
 from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.laws import product
+from paint_deposition.kernel.eq2_flux import product
 
 law = load_effect_file(sys.argv[1]).flux_factor
 factor = product([(law, 1)], float)

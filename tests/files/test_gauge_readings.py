@@ -230,8 +230,8 @@ def test_brushes_are_written_and_read_back_without_loss(tmp_path: Path):
         for brush in MODEL.brushes
     }
     assert all('#' in line for line in path.read_text().splitlines() if ': ' in line)
-    other = MODEL.of_brushes(
-        [*MODEL.brushes[:1], MODEL.brushes[1].model_copy(update={'solids': 0.5})],
+    other = pd.DepositionModel(
+        brushes=[*MODEL.brushes[:1], MODEL.brushes[1].model_copy(update={'solids': 0.5})],
         effects=MODEL.effects,
     )
     assert model_digest(other) != model_digest(MODEL) == model_digest(read_model(path))

@@ -11,14 +11,19 @@ import yaml
 from booth import SAMPLES
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap, PartGrid
+from paint_deposition.effects.learned_laws import (
+    LearnedFootprint,
+    LearnedLaw,
+    LearnedMap,
+    PartGrid,
+)
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.files.model_file import read_model, read_model_file, write_model
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.model.eq1_pattern import PATTERN, PlanarPattern
 
 

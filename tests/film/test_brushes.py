@@ -48,7 +48,9 @@ def test_two_brushes_on_one_part_lay_the_sum_of_their_films():
     total = sum(one.film_um for one in apart)
     # Sub-steps are not cut where both sides of a change are without paint.
     assert np.abs(both.film_um - total).max() < 2e-4 * total.max()
-    assert both.emitted_cm3 == pytest.approx(sum(one.emitted_cm3 for one in apart), rel=1e-12)
+    assert both.used.emitted_cm3 == pytest.approx(
+        sum(one.used.emitted_cm3 for one in apart), rel=1e-12
+    )
     assert min(one.film_um.max() for one in apart) > 1.0
 
 
@@ -59,7 +61,7 @@ def test_one_brush_is_its_pattern_to_the_last_bit(number):
     plain = painted(
         lying_plane(), replace(motion, trigger_brush=np.empty(0, np.int64)), DepositionModel()
     )
-    one = DepositionModel.of_brushes([Brush(number=5, planar=DepositionModel().planar)])
+    one = DepositionModel(brushes=[Brush(number=5, planar=DepositionModel().planar)])
     assert np.array_equal(painted(lying_plane(), motion, one).film_um, plain.film_um)
     # A cell that numbers its only brush needs no other model.
     assert np.array_equal(painted(lying_plane(), motion, DepositionModel()).film_um, plain.film_um)

@@ -124,7 +124,7 @@ def test_states_after_a_clock_was_set_back_count_though_the_film_is_reset_before
     film.add_poses(poses(again, slice(20, None)))
     seconds = 0.8 - 0.08 + 0.5 * (TIMES_S[-1] - 1.2)
     emitted_cm3 = MODEL.planar.K1_cm3_per_s * seconds
-    assert film.snapshot().emitted_cm3 == pytest.approx(emitted_cm3, rel=0.01)
+    assert film.snapshot().used.emitted_cm3 == pytest.approx(emitted_cm3, rel=0.01)
 
 
 @pytest.mark.parametrize('before', [0, 10])
@@ -266,4 +266,4 @@ def test_a_clock_that_is_set_back_within_a_part_gives_the_offline_film(batch, ba
     flown = [1.0] * (half - 100) + ([0.5 if switched else stays] * 150) + [0.0] * 70
     seconds = 0.004 * (sum(flown) + len(motion) - half - 220)
     emitted_cm3 = MODEL.planar.K1_cm3_per_s * seconds
-    assert offline.emitted_cm3 == pytest.approx(emitted_cm3, rel=0.02)
+    assert offline.used.emitted_cm3 == pytest.approx(emitted_cm3, rel=0.02)

@@ -78,11 +78,11 @@ def test_a_film_is_never_negative_and_holds_what_was_sprayed(motion, model):
     assert np.isfinite(film.film_um).all()
     landed_cm3 = float(film.film_um @ PLANE.area_m2)
     # All of the narrow pattern meets the plane; what is off is the sum over its points.
-    off_cm3 = 0.01 * film.emitted_cm3
+    off_cm3 = 0.01 * film.used.emitted_cm3
     attraction = sum(effect.attraction for effect in model.effects if effect.flux_factor)
     # It lays 1 + a (1 - cos) of what there is: more than all, and less than 1 + a times.
-    assert landed_cm3 >= film.emitted_cm3 - off_cm3
-    assert landed_cm3 <= (1.0 + attraction) * film.emitted_cm3 + off_cm3
+    assert landed_cm3 >= film.used.emitted_cm3 - off_cm3
+    assert landed_cm3 <= (1.0 + attraction) * film.used.emitted_cm3 + off_cm3
 
 
 @pytest.mark.slow

@@ -115,7 +115,7 @@ def painted(*brushes: Brush) -> tuple[FilmIntegrator, float, float]:
         **switched(stamps_ns([0.5, 1.5, 3.5]), (0.5, 1), (1.0, 2), (0.0, 0)),
     )
     points = lying_plane(1.5, 101)
-    film = scenes.painted(points, motion, DepositionModel.of_brushes(brushes), 'double')
+    film = scenes.painted(points, motion, DepositionModel(brushes=brushes), 'double')
     return film, float(film.film_um.mean()), float(points.area_m2 @ film.film_um)
 
 
@@ -152,7 +152,7 @@ def test_amounts_add_up_however_the_path_was_cut():
         straight_pass(np.arange(0.0, 4.0, 0.02)),
         **switched(stamps_ns([0.5, 1.5, 3.5]), (0.5, 1), (1.0, 2), (0.0, 0)),
     ))  # fmt: skip
-    model = DepositionModel.of_brushes([ONE, TWO])
+    model = DepositionModel(brushes=[ONE, TWO])
     whole = PaintUsed.of(model, path)
     parts = [PaintUsed.of(model, path.select(slice(k, k + 37))) for k in range(0, len(path), 37)]
     total = sum(parts, PaintUsed())
@@ -164,7 +164,7 @@ def test_more_solids_than_are_sprayed_are_told():
     """K1 is 1.3 cm3/s; 120 cm3/min at half solids are 1."""
     thin = ONE.model_copy(update={'flow_cm3_per_min': 120.0})
     assert efficiency(thin) == pytest.approx(1.3)
-    (line,) = impossible_brushes(DepositionModel.of_brushes([thin, TWO]))
+    (line,) = impossible_brushes(DepositionModel(brushes=[thin, TWO]))
     assert line.startswith('brush 1 would lay 1.30 times the solids that it sprays')
     assert math.isnan(efficiency(Brush(number=2, planar=WIDE)))
-    assert impossible_brushes(DepositionModel.of_brushes([Brush(number=2, planar=WIDE)])) == ()
+    assert impossible_brushes(DepositionModel(brushes=[Brush(number=2, planar=WIDE)])) == ()

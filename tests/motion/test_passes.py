@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import scenes
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.interruptions import checked_path, interruptions
-from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.path_builder import checked_path, interruptions, spray_path
 from paint_deposition.motion.trajectory import Trajectory
 
 SPEED_M_PER_S = 0.5

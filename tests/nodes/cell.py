@@ -16,9 +16,9 @@ from rclpy.time import Time
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.transforms import Rigid
 
 START_NS = 1_760_000_000_000_000_000
 # The tool's z axis along +y, toward a panel that looks to -y.

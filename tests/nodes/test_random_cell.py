@@ -47,7 +47,7 @@ from paint_deposition.files.recordings.bags import STATE_TOPIC
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.model.eq1_pattern import Brush
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.robot.egm_source import EgmSource
 from paint_deposition.nodes.runtime.topics import header
@@ -115,8 +115,10 @@ class Cell(RuleBasedStateMachine):
         self.meshes = [str(narrow), str(wide)]
         models = (
             two_brushes(),
-            DepositionModel.of_brushes(
-                Brush(number=n, planar=p) for n, p in zip(BRUSHES, (WIDE, NARROW), strict=True)
+            DepositionModel(
+                brushes=[
+                    Brush(number=n, planar=p) for n, p in zip(BRUSHES, (WIDE, NARROW), strict=True)
+                ]
             ),
         )
         self.models = [str(self.folder / f'{name}.yaml') for name in 'ab']

@@ -12,7 +12,7 @@ from rcl_interfaces.srv import SetParameters
 
 import paint_deposition as pd
 from nodes.cell import offline_um, parameters, two_passes
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.bags.bag_player import BagPlayer
 from paint_deposition.nodes.runtime.topics import header
 

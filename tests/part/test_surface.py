@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from trimesh.creation import box, icosphere
 
-from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.points import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from surfaces import ball, cylinder, flat, fold, refined, triangulated
 

@@ -5,7 +5,7 @@ import pytest
 from trimesh.creation import box
 from trimesh.util import concatenate
 
-from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.points import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface, facing, toward_the_guns
 from surfaces import ball, flat, fold, refined, triangulated
 

@@ -16,8 +16,8 @@ from cli.command import paint
 from paint_deposition.api.planning import place, read_robot
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.motion.part_frame import Rigid, at_part, moved
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.transforms import Rigid, at_part, moved
 from paint_deposition.planning.joints import JointPace, starts
 from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import driven, plan

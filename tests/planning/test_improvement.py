@@ -14,7 +14,7 @@ from brushes import switched
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.errors import PaintError, PlanError
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed

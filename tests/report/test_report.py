@@ -133,7 +133,7 @@ def test_the_verdict_comes_in_words_and_figures(report, diagnosis):
     for figure in (first.rmse_um, last.rmse_um, first.holdout_rmse_um, last.holdout_rmse_um):
         assert f'{figure:.2f}' in text
     assert 'The model lacked air drift' in text
-    assert f'{diagnosis.noise_floor_um:.2f}' in text
+    assert f'{diagnosis.study.noise_floor_um:.2f}' in text
     assert 'The same passes at half the flow' in text
     shift = next(iter(diagnosis.classes[0].parameters.values())).value
     assert f'{1e3 * shift:.3g}'.replace('-', '−') in text
@@ -222,7 +222,7 @@ def test_an_effect_added_as_asked_is_told_whatever_the_verdict(
 
 def test_the_whole_history_is_told_each_step_with_its_campaign(particular, diagnosis):
     errors = [f'{step.rmse_um:.2f} {step.holdout_rmse_um:.2f}' for step in diagnosis.history]
-    floor = f'{diagnosis.noise_floor_um:.2f}'
+    floor = f'{diagnosis.study.noise_floor_um:.2f}'
     assert (
         'pattern of eq. (1) alone panel.yaml 7.77 8.88 0.66 + TCP tilt panel.yaml 6.66 '
         f'model as given, refitted door.yaml {errors[0]} {floor} '

@@ -10,7 +10,7 @@ from booth import SAMPLES
 from paint_deposition.effects.base import Effect, parameter
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import WAVES, LearnedFootprint, LearnedMap, PartGrid
+from paint_deposition.effects.learned_laws import WAVES, LearnedFootprint, LearnedMap, PartGrid
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.inference.comparison.comparison import compare

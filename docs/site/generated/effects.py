@@ -5,7 +5,7 @@ from inspect import cleandoc
 from generated.markdown import prose, table
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
-from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned_curves import CURVES
 
 
 def text() -> str:

@@ -16,7 +16,7 @@ from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.messages import STATE_TEXT, STATE_TYPE, Definition, standard
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.transforms import Rigid
 
 
 def same(read: pd.Trajectory, written: pd.Trajectory) -> bool:

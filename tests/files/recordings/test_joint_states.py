@@ -13,7 +13,7 @@ from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.pose_topics import sources_of_poses
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.transforms import Rigid
 from robot_arm import JOINTS, TIP_M, URDF, sweep, tip_poses
 from scenes import stamps_ns
 

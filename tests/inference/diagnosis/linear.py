@@ -7,14 +7,13 @@ import numpy as np
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.learned.law import LearnedFootprint
+from paint_deposition.effects.learned_laws import LearnedFootprint
 from paint_deposition.inference.diagnosis.discrepancy import Footprints, ModelDiscrepancy
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, Sensitivity
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 
 MODEL = pd.DepositionModel()
 PARAMETERS = FreeParameters.of(MODEL)

@@ -13,7 +13,7 @@ from inference.diagnosis.readings_on_door import (
     plate_with_a_back,
     study_of,
 )
-from paint_deposition.effects.learned.law import WAVES
+from paint_deposition.effects.learned_laws import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.design.sprays import MENU
 from paint_deposition.inference.diagnosis.discrepancy import (

@@ -12,7 +12,7 @@ from booth import MODEL
 from inference.diagnosis.linear import KNOWN, PARAMETERS, fit_linear, linear_fit, null_of
 from inference.diagnosis.readings_on_door import on_door, on_panel, study_of
 from paint_deposition.effects.catalogue import LEARNED
-from paint_deposition.effects.learned.law import LearnedLaw, hat_weights
+from paint_deposition.effects.learned_laws import LearnedLaw, hat_weights
 from paint_deposition.inference.diagnosis import gaussian, smooth_laws
 from paint_deposition.inference.diagnosis.model_space import SIZES
 from paint_deposition.inference.fitting.least_squares import Fit

@@ -10,7 +10,7 @@ from inference.diagnosis.linear import linear_fit, null_of
 from inference.diagnosis.readings_on_door import at_model
 from inference.fitting.panels import ORDERS, gauged, reading
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
-from paint_deposition.effects.learned.law import hat_weights
+from paint_deposition.effects.learned_laws import hat_weights
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.diagnosis import learning
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
@@ -32,14 +32,15 @@ CURVE = CURVE.random(1.0, 0.5)
 CHANGE = CURVE.change_um
 WAVY = Explanation(UNKNOWN, CHANGE, np.zeros(CHANGE.shape[1]), 1.0, random=CURVE)
 
+KINDS = ('footprint', 'correction', 'place', 'other')
 
-def nulls(change: np.ndarray, **others: np.ndarray) -> learning.NullModels:
+
+def nulls(change: np.ndarray, **others: np.ndarray) -> learning.Nulls:
     """Beside noise that a change (P,) has moved; for some kinds of law more (P, n) may vary."""
     base = null_of(linear_fit(np.random.default_rng(0), POINTS))
     null = NullModel.of(base.columns, base.scaled_deviation + change)
     beside = {kind: null.beside(columns) for kind, columns in others.items()}
-    kinds = ('footprint', 'correction', 'place', 'nonparametric_laws')
-    return learning.NullModels(**{kind: beside.get(kind, null) for kind in kinds})
+    return {kind: beside.get(kind, null) for kind in KINDS}
 
 
 def test_a_law_is_learned_once_where_there_is_one():
@@ -53,10 +54,11 @@ def test_a_law_is_learned_once_where_there_is_one():
 
 def test_a_law_must_say_more_than_what_may_vary_already():
     """Than any footprint could; but a correction of a law need not say more than its errors."""
-    hidden = nulls(WAVE, nonparametric_laws=3.0 * CHANGE)
+    hidden = nulls(WAVE, other=3.0 * CHANGE)
     assert learning.choose_laws(hidden, [WAVY], np.inf) == []
     assert len(learning.choose_laws(hidden, [replace(WAVY, corrects='edge_build')], np.inf)) == 1
-    assert learning.choose_laws(nulls(WAVE).beside(3.0 * CHANGE), [WAVY], np.inf) == []
+    beside = nulls(WAVE, **dict.fromkeys(KINDS, 3.0 * CHANGE))
+    assert learning.choose_laws(beside, [WAVY], np.inf) == []
 
 
 # Three panels of which the passes were painted in three orders.

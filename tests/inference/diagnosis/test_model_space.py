@@ -9,7 +9,7 @@ from scipy.stats import binom, kstest, multivariate_normal, multivariate_t
 
 from inference.diagnosis import linear
 from inference.diagnosis.linear import law, unknown
-from paint_deposition.inference.diagnosis import model_space, testability
+from paint_deposition.inference.diagnosis import model_space, proposals
 from paint_deposition.inference.diagnosis.discrepancy import (
     PRIOR,
     DiscrepancyHyperparameters,
@@ -261,22 +261,22 @@ def test_a_detectable_amplitude_is_detected_nine_times_in_ten(freedom, plain, fo
     """Through the test that the diagnosis makes, on readings that the effect has moved."""
     monkeypatch.setattr(model_space, 'DRAWS', 500)
     space = model_space.EffectEvidence(plain, found, freedom)
-    _, detectable = testability.testability(space, seed=3)
-    limit = np.quantile(space.evidence(space.null_draws(3)), 1.0 - testability.LEVEL)
+    _, detectable = proposals.testability(space, seed=3)
+    limit = np.quantile(space.evidence(space.null_draws(3)), 1.0 - proposals.LEVEL)
     noise = simulated(READINGS, freedom, POWER_RUNS, seed=6)
     for explanation in found[4:6]:
         effect, (name,) = explanation.cause, explanation.law.names
         typical = type(explanation.law.effect).parameters()[name]['typical']
         change = detectable[effect][name] / typical * plain.whiten(explanation.columns)
         seen = np.count_nonzero(space.evidence(noise + change) > limit)
-        low, high = binom.interval(1.0 - CHANCE, POWER_RUNS, testability.POWER)
+        low, high = binom.interval(1.0 - CHANCE, POWER_RUNS, proposals.POWER)
         assert low <= seen <= high, effect
 
 
 def test_what_nature_leaves_over_or_hides_in_the_pattern_is_less_testable(plain, found):
     def detectable_gain(null: NullModel) -> float:
         space = model_space.EffectEvidence(null, found, np.inf)
-        _, detectable = testability.testability(space, seed=3)
+        _, detectable = proposals.testability(space, seed=3)
         return detectable['edge_build']['gain']
 
     along = found[4].columns
@@ -285,4 +285,4 @@ def test_what_nature_leaves_over_or_hides_in_the_pattern_is_less_testable(plain,
     # A direction that the pattern takes up whole shows nothing, however strong.
     hidden = plain.columns[:, 0] / np.linalg.norm(plain.columns[:, 0])
     space = model_space.EffectEvidence(plain, [law('edge_build', hidden)], np.inf)
-    assert testability.testability(space, seed=0) == (('edge_build',), {})
+    assert proposals.testability(space, seed=0) == (('edge_build',), {})

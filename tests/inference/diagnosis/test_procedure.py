@@ -191,7 +191,7 @@ def test_two_effects_are_found_each_with_a_step_that_improves_the_prediction():
         assert after.rmse_um < before.rmse_um
         errors = {'before': before.holdout_rmse_um, 'after': after.holdout_rmse_um}
         assert group.holdout_rmse_um == errors
-    assert steps[-1].rmse_um < 1.2 * found.noise_floor_um
+    assert steps[-1].rmse_um < 1.2 * found.study.noise_floor_um
     # Amounts of both are found together.
     assert {effect.id for effect in found.model.effects} == set(found.accepted)
     assert found.model.effect('fog_gradient').fog_um == pytest.approx(6.0, abs=1.2)

@@ -14,10 +14,9 @@ from inference.fitting.panels import column, painted_by, passes
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.inference.fitting.calibration import brush_figures
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.inference.fitting.posterior import of_brushes, with_brushes_of
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PATTERN, Brush, PlanarPattern
 
@@ -32,8 +31,11 @@ SETTINGS = {
     1: {'flow_cm3_per_min': 300.0, 'solids': 0.45, 'bell_speed_rpm': 40e3},
     4: {'flow_cm3_per_min': 200.0, 'solids': 0.45, 'bell_speed_rpm': 25e3},
 }
-TRUTH = pd.DepositionModel.of_brushes(
-    [Brush(number=1, planar=FIRST, **SETTINGS[1]), Brush(number=4, planar=SECOND, **SETTINGS[4])]
+TRUTH = pd.DepositionModel(
+    brushes=[
+        Brush(number=1, planar=FIRST, **SETTINGS[1]),
+        Brush(number=4, planar=SECOND, **SETTINGS[4]),
+    ]
 )
 VECTOR = PatternVector((1, 4))
 
@@ -111,7 +113,7 @@ def test_panels_of_two_brushes_give_both_patterns_and_transfer_efficiencies_back
     assert [panel is None for panel in calibrated.panels] == [False, False, True]
     settled = [Brush(number=b.number, planar=b.planar, **SETTINGS[b.number])
                for b in calibrated.model.brushes]  # fmt: skip
-    told = brush_figures(pd.DepositionModel.of_brushes(settled), calibrated.parameters)
+    told = brush_figures(pd.DepositionModel(brushes=settled), calibrated.parameters)
     for brush in TRUTH.brushes:
         figures = told['by_number'][str(brush.number)]
         share = brush.planar.K1_cm3_per_s * 60.0 / (brush.flow_cm3_per_min * brush.solids)
@@ -128,7 +130,7 @@ def test_the_written_model_has_all_brushes_that_were_given(calibrated, tmp_path)
     assert again.uncertainty['brush_4']['r_m'] > 0.0
     # A brush that was not painted with stays as it was given.
     third = Brush(number=7, planar=FIRST, flow_cm3_per_min=250.0, bell_speed_rpm=3e4, solids=0.45)
-    start = ModelFile(pd.DepositionModel.of_brushes([*TRUTH.brushes, third]))
+    start = ModelFile(pd.DepositionModel(brushes=[*TRUTH.brushes, third]))
     files = pd.write(calibrated, tmp_path / 'three', start=start)
     assert json.loads(files[1].read_text())['brushes']['by_number'].keys() == {'1', '4'}
     kept = read_model_file(files[0])

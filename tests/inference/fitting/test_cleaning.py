@@ -14,11 +14,9 @@ from paint_deposition.inference.fitting import cleaning
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.outliers import (
     FittedPoints,
-    LeaveOneOut,
     Outlier,
     find_outliers,
 )
-from paint_deposition.inference.readings.covariates import Covariate
 from paint_deposition.report.words import count_words
 from small_campaign import small_campaign
 
@@ -38,13 +36,13 @@ def scattered(seed: int, texture: float = 0.005) -> FittedPoints:
     film = np.full(COUNT, FILM_UM)
     return FittedPoints(
         noise, film, np.full(COUNT, GAUGE_UM), film[:, np.newaxis], np.zeros(COUNT, dtype=int),
-        positions, tuple(Covariate(name, values) for name, values in along.items()),
+        positions, along,
     )  # fmt: skip
 
 
 def built_up(misfit: FittedPoints) -> FittedPoints:
     """The same with half as much film again at the edge, falling off within 20 mm."""
-    distance_m = misfit.covariates[0].values
+    distance_m = misfit.covariates['edge_distance_m']
     more = 0.5 * FILM_UM * np.exp(-distance_m / 0.02)
     return replace(misfit, residual_um=misfit.residual_um + more)
 
@@ -70,7 +68,7 @@ def test_sound_readings_are_kept_whatever_is_missing(missing):
 @pytest.mark.parametrize('by_um', [9.0 * FILM_UM, -0.9 * FILM_UM, 12.0 * GAUGE_UM])
 def test_a_slip_is_found_whatever_is_missing(missing, by_um):
     misfit = missing(scattered(0))
-    row = int(np.argmax(misfit.covariates[0].values))  # well inside the sheet
+    row = int(np.argmax(misfit.covariates['edge_distance_m']))  # well inside the sheet
     assert list(find_outliers(slipped(misfit, row, by_um), EVERY)) == [row]
 
 
@@ -94,9 +92,9 @@ def test_a_point_that_was_read_again_is_no_slip():
 def test_a_prediction_without_the_reading_is_that_of_the_others_alone():
     """The closed form against a mixture that has never seen the reading."""
     # Without covariates, whose scale would be that of the readings.
-    misfit, row = replace(built_up(scattered(4)), covariates=()), 17
+    misfit, row = replace(built_up(scattered(4)), covariates={}), 17
     others = np.delete(np.arange(COUNT), row)
-    whole, without = LeaveOneOut.of(misfit), LeaveOneOut.of(misfit.select(others))
+    whole, without = misfit.leave_one_out, misfit.select(others).leave_one_out
     joint = np.logaddexp.reduce(whole.log_weight) - np.logaddexp.reduce(without.log_weight)
     normal = -0.5 * np.log(2.0 * np.pi)
     # The smallest directions of a field, which are left out, are not quite those of all.
@@ -118,7 +116,7 @@ def test_what_was_probably_meant(written, expected, guess):
 @pytest.mark.parametrize('texture', [0.002, 0.02])
 def test_the_texture_is_estimated_beside_a_missing_effect(texture):
     misfits = [built_up(scattered(seed, texture)) for seed in range(12)]
-    shares = [LeaveOneOut.of(misfit).texture_share for misfit in misfits]
+    shares = [misfit.leave_one_out.texture_share for misfit in misfits]
     assert np.mean(shares) == pytest.approx(texture, abs=0.006)
 
 

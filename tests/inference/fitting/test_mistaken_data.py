@@ -130,9 +130,9 @@ def test_a_target_tells_the_unit_where_the_film_alone_does_not(first, second):
 
 
 def test_a_model_of_another_gun_is_named_and_does_not_stop(panels):
-    (mistake,) = clean_and_fit(panels, of_level(0.3), starts=1)[0].mistakes
-    assert "another gun's" in mistake.sentence
-    assert not mistake.stops
+    ((sentence, stops),) = clean_and_fit(panels, of_level(0.3), starts=1)[0].mistakes
+    assert "another gun's" in sentence
+    assert not stops
 
 
 def test_a_comparison_warns_of_mirrored_and_names_swapped_readings_once(first, second):

@@ -12,14 +12,13 @@ from inference.fitting.panels import painted_by, passes
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.errors import ModelError
 from paint_deposition.inference.fitting.estimates import scaled_covariance
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.posterior import (
     PatternShift,
     draw_models,
     posterior_of,
     prior_for,
 )
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import EFFECT_BETWEEN_JOBS, PATTERN
 

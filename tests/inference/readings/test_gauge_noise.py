@@ -175,7 +175,7 @@ def test_figures_of_residuals_by_hand():
     found = Residuals(measured_um, predicted_um, np.full(3, 2.0))
     assert found.bias_um == pytest.approx(1.0)
     assert found.rmse_um == pytest.approx(np.sqrt((16 + 4 + 9) / 3))
-    assert found.rmse_painted_um == pytest.approx(np.sqrt((4 + 9) / 2))
+    assert found.select(found.painted).rmse_um == pytest.approx(np.sqrt((4 + 9) / 2))
     assert found.chi_square_per_reading == pytest.approx(29 / 3 / 4)
     assert found.worst == 0
 

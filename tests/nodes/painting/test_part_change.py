@@ -140,7 +140,7 @@ def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
     """Closed before the change it is closed after it, and it sprays on with its brush."""
     brushes = two_brushes()
     pd.write_model(tmp_path / 'brushes.yaml', brushes)
-    other = pd.DepositionModel.of_brushes([Brush(number=1, planar=brushes.planar)])
+    other = pd.DepositionModel(brushes=[Brush(number=1, planar=brushes.planar)])
     pd.write_model(tmp_path / 'other.yaml', other)
     node = simulator(model_file=str(tmp_path / 'brushes.yaml'), repaint=False)
     source = robot(node)

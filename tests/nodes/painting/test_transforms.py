@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from nodes.cell import START_NS, Broadcaster, offline_um, two_passes
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import STATE_TOPIC
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.transforms import Rigid
 
 MOTION = two_passes(poses=600)
 POSE_TOPIC = '/atomizer/pose'

@@ -16,7 +16,7 @@ from std_msgs.msg import Bool, Float64, UInt16
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
 from paint_deposition.nodes.robot.robot_poses import JointPoses
 from paint_deposition.nodes.runtime.node import ERROR

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from nodes.cell import START_NS, Broadcaster, parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
 
 needs_tf = pytest.mark.skipif(

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import LEARNED
-from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.film.integrator import FilmIntegrator
@@ -20,7 +20,7 @@ from paint_deposition.inference.diagnosis import closed_forms
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.fitting.estimates import estimates
-from paint_deposition.kernel.laws import Ray
+from paint_deposition.kernel.eq2_flux import Ray
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.report.writers.inference import (
     effect_entry,

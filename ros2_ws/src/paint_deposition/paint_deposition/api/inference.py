@@ -25,8 +25,8 @@ from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.calibration import calibrate as calibrated
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.panel import short_reaches
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.posterior import of_brushes, with_brushes_of
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import require_paint
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory
@@ -176,7 +176,7 @@ def refit(
 
 def _about(found: Diagnosis) -> tuple[str, ...]:
     """What is simply wrong with the data and does not stop the diagnosis, which would say it."""
-    return tuple(mistake.sentence for mistake in found.study.mistakes if not mistake.stops)
+    return tuple(sentence for sentence, stops in found.study.mistakes if not stops)
 
 
 def _start(

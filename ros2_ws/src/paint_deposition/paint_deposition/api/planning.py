@@ -13,11 +13,11 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError, RecordingError
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.film.integrator import NO_PAINT_UM
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.posterior import draw_models
-from paint_deposition.inference.posterior import Posterior
-from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
 from paint_deposition.motion.programmed import timed
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones, Zones
 from paint_deposition.planning.driving import RobotCell

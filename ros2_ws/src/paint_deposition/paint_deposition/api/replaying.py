@@ -141,7 +141,7 @@ class Replay:
         film, (target_um, tolerance_um) = films.snapshot(), self._target
         film_um = film.film_um
         figures = film_statistics(
-            film_um, self._surface.vertex_areas_m2, film.emitted_cm3,
+            film_um, self._surface.vertex_areas_m2, film.used.emitted_cm3,
             target_um=target_um, target_tolerance_um=tolerance_um,
         )  # fmt: skip
         scale = film_scale(film_um)

@@ -18,8 +18,8 @@ from paint_deposition.film.statistics import film_statistics, require_band
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.plausibility import readings_in_doubt
 from paint_deposition.inference.readings.readings import Readings
-from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import checked_path
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, PoseCounts, Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, toward_the_guns
@@ -190,13 +190,13 @@ def simulate(
         cause = geometry.warnings[0] if geometry.warnings else geometry.sentence
         raise RecordingError(f'{motions[0].source}: no paint lands on the part: {cause}')
     statistics = film_statistics(
-        film_um, surface.vertex_areas_m2, common.emitted_cm3,
+        film_um, surface.vertex_areas_m2, common.used.emitted_cm3,
         target_um=target_um, target_tolerance_um=tolerance_um, zones=point_zones,
     )  # fmt: skip
     guns = tuple(
         GunFilm(
             name, gun.trajectory, gun.path, gun.counts, its_model, gun.geometry,
-            laid_cm3, integrator.emitted_cm3,
+            laid_cm3, integrator.used.emitted_cm3,
         )
         for name, gun, its_model, laid_cm3, integrator in zip(
             names or [''], seen, models, common.laid_cm3(surface.vertex_areas_m2).tolist(),
@@ -219,7 +219,7 @@ def simulate(
     added = []
     for name in laid.names if coats else ():
         rows = laid.guns_of(name)
-        used, coat_um = common.of_guns(rows).used, common.layer_um(laid, name)
+        used, coat_um = CommonFilm(common.guns[rows]).used, common.layer_um(laid, name)
         of_coat = film_statistics(coat_um, surface.vertex_areas_m2, used.emitted_cm3)
         added.append(CoatFilm(name, guns[rows], coat_um, of_coat, used))
     return Film(

@@ -19,8 +19,8 @@ from paint_deposition.files.atomic import read_yaml
 from paint_deposition.files.motion_files import MotionSource
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
-from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.transforms import POSE_FORMAT, is_pose
 from paint_deposition.request import Number, Text, validate
 
 INPUTS = ('mesh', 'trajectory', 'model')

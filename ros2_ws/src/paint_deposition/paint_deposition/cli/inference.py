@@ -230,7 +230,7 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
     if effect_file is not None:
         # What cannot become an effect file is refused before anything is computed.
-        from paint_deposition.effects.learned.curves import LearnedCurve
+        from paint_deposition.effects.learned_curves import LearnedCurve
 
         if not (isinstance(added, type) and issubclass(added, LearnedCurve)):
             raise click.UsageError(
@@ -254,7 +254,7 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
 
 def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
     """Write the law learned last as an effect, and say how to use it."""
-    from paint_deposition.effects.learned.curves import LearnedCurve
+    from paint_deposition.effects.learned_curves import LearnedCurve
     from paint_deposition.inference.diagnosis.closed_forms import forms_of
     from paint_deposition.report.writers.inference import effect_entry, write_effect_file
 
@@ -286,7 +286,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[s
     yield (
         f'RMSE {before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on '
         f'{diagnosis.left_out} held out, {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the '
-        f'fitted points; gauge and texture {diagnosis.noise_floor_um:.2f} µm'
+        f'fitted points; gauge and texture {diagnosis.study.noise_floor_um:.2f} µm'
     )
     yield from (zone.sentence for zone in diagnosis.comparisons[-1].zones)
     yield from (f'worse than before: {one}' for one in diagnosis.worse)

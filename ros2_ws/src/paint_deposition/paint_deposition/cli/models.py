@@ -15,7 +15,7 @@ from paint_deposition.errors import ModelError
 
 if TYPE_CHECKING:
     from paint_deposition.files.model_file import ModelFile
-    from paint_deposition.inference.posterior import Posterior
+    from paint_deposition.inference.fitting.parameters import Posterior
     from paint_deposition.planning.driving import RobotCell
 
 

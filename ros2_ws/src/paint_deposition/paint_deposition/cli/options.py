@@ -189,7 +189,7 @@ def _type(annotation: Any, metadata: list[Any], shown: Callable[[Any], Any]) -> 
 def _pose(ctx: click.Context, param: click.Parameter, given: tuple | None) -> list[float] | None:
     if given is None:
         return None
-    from paint_deposition.motion.part_frame import is_pose
+    from paint_deposition.motion.transforms import is_pose
 
     if not is_pose(given):
         words = f'the quaternion qx qy qz qw has the norm {math.hypot(*given[3:]):.4g}, not 1'

@@ -9,11 +9,11 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from paint_deposition.kernel.laws import Ray as Ray
+from paint_deposition.kernel.eq2_flux import Ray as Ray
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path import SprayPath as SprayPath
-from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.points import SurfacePoints as SurfacePoints
+from paint_deposition.part.points import across_axis, downhill_axis
 
 # Curvature at which the effects of curvature have their full amplitude: a radius of 250 mm.
 REFERENCE_CURVATURE_PER_M = 1.0 / 0.250
@@ -188,5 +188,4 @@ class Effect(BaseModel):
 
     def values(self) -> tuple[float, ...]:
         """Parameter values in the order declared."""
-        own = (name for name in type(self).model_fields if name not in Effect.model_fields)
-        return tuple(float(getattr(self, name)) for name in own)
+        return tuple(float(getattr(self, name)) for name in self.parameters())

@@ -7,8 +7,8 @@ from types import MappingProxyType
 
 from paint_deposition.effects import library
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap
+from paint_deposition.effects.learned_curves import CURVES
+from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedLaw, LearnedMap
 from paint_deposition.errors import ModelError, did_you_mean
 
 # In the order in which people look for causes.

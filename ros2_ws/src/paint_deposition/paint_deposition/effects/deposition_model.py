@@ -45,11 +45,6 @@ class DepositionModel(BaseModel):
         ordered = tuple(by_number[number] for number in sorted(by_number))
         return {**values, 'planar': ordered[0].planar, 'brushes': ordered}
 
-    @staticmethod
-    def of_brushes(brushes: Iterable[Brush], **rest: Any) -> 'DepositionModel':
-        """The model with these brushes, each number once, and the other fields."""
-        return DepositionModel(brushes=tuple(brushes), **rest)
-
     @property
     def patterns(self) -> tuple[PlanarPattern, ...]:
         """The patterns of the brushes in the order of their numbers, or the only one."""
@@ -88,10 +83,8 @@ class DepositionModel(BaseModel):
         self.require_brushes(wanted)
         if len(self.brushes) <= 1:
             return self
-        return DepositionModel.of_brushes(
-            (brush for brush in self.brushes if brush.number in wanted),
-            projection=self.projection, effects=self.effects,
-        )  # fmt: skip
+        kept = tuple(brush for brush in self.brushes if brush.number in wanted)
+        return DepositionModel(brushes=kept, projection=self.projection, effects=self.effects)
 
     def with_missing_brushes(self, given: 'DepositionModel') -> 'DepositionModel':
         """A copy with the brushes of a given model that this one does not have."""
@@ -99,8 +92,8 @@ class DepositionModel(BaseModel):
         others = [brush for brush in given.brushes if brush.number not in own]
         if not others:
             return self
-        return DepositionModel.of_brushes(
-            (*self.brushes, *others), projection=self.projection, effects=self.effects
+        return DepositionModel(
+            brushes=(*self.brushes, *others), projection=self.projection, effects=self.effects
         )
 
     @property

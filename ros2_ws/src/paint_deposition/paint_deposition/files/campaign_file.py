@@ -26,7 +26,7 @@ from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import TOTAL
 from paint_deposition.film.statistics import require_band
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.motion.interruptions import checked_path
+from paint_deposition.motion.path_builder import checked_path
 from paint_deposition.part.surface import toward_the_guns
 from paint_deposition.request import Name, Number, OnePart, Text, validate
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect, PathContext
-from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.errors import did_you_mean
 from paint_deposition.kernel.compiler import njit
-from paint_deposition.kernel.laws import Ray, in_precision
+from paint_deposition.kernel.eq2_flux import Ray, in_precision
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path

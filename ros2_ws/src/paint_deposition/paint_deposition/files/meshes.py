@@ -15,7 +15,7 @@ from paint_deposition.errors import MeshError, did_you_mean, some
 from paint_deposition.files.atomic import replacing, require_file, require_small_package
 from paint_deposition.part.edges import Edges, weld
 from paint_deposition.part.points import box_extent_m
-from paint_deposition.part.refinement import face_areas_m2, longest_edges_m
+from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
 from paint_deposition.part.surface import Surface
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def read_triangles(
         )
     vertices, faces = weld(vertices, faces)
     # Triangles lower than this have no direction that could be trusted.
-    heights_wanted = 1e-7 * longest_edges_m(vertices, faces)
+    heights_wanted = 1e-7 * edge_lengths_m(vertices, faces).max(axis=1)
     rows = np.flatnonzero(2.0 * face_areas_m2(vertices, faces) > heights_wanted)
     if not len(rows):
         raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')

@@ -15,12 +15,12 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class, learned_law
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError, quoted
 from paint_deposition.files.atomic import plain, read_yaml, write_text
 from paint_deposition.files.effect_file import load_effect_file
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.model.eq1_pattern import MOST, Brush, PlanarPattern, SetPoints
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.request import validate
@@ -142,7 +142,7 @@ def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
     elif sections.planar is not None:
         raise ModelError('planar and brushes are both given; keep one of them')
     else:
-        patterns = DepositionModel.of_brushes(_brushes(sections.brushes))
+        patterns = DepositionModel(brushes=_brushes(sections.brushes))
     eq_2 = Projection(**projection.model_dump(exclude={'occlusion'}))
     model = patterns.model_copy(update={'projection': eq_2, 'effects': tuple(effects)})
     posterior = None
@@ -215,7 +215,7 @@ def model_text(
         text['brushes'] = CommentedMap()
         for brush in model.brushes:
             entry = CommentedMap({'planar': _fields(brush.planar)})
-            entry |= plain(brush.set_points.model_dump(exclude_none=True))
+            entry |= plain(brush.model_dump(exclude={'number', 'planar'}, exclude_none=True))
             for key in [*entry][1:]:
                 description = SetPoints.model_fields[key].description
                 entry.yaml_add_eol_comment(description, key, COMMENT_COLUMN)

@@ -19,13 +19,13 @@ from paint_deposition.files.recordings.messages import JOINT_TYPE
 from paint_deposition.files.recordings.pose_topics import lookups, read_frames
 from paint_deposition.files.tables.pose_columns import CONVENTIONS, ROTATION_WORDS
 from paint_deposition.files.tables.poses import is_pose_table, read_pose_table
-from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
 from paint_deposition.request import MotionOptions, validate
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
-    from paint_deposition.motion.frame_tree import FrameTree
+    from paint_deposition.motion.transforms import FrameTree
 
 PART = 'part'
 # Programs that are not read, by their suffix: whose they are, and the convention of their angles.

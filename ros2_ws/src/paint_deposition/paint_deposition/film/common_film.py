@@ -166,11 +166,6 @@ class CommonFilm:
         """Paint that left the guns."""
         return sum((gun.used for gun in self.guns), PaintUsed())
 
-    @property
-    def emitted_cm3(self) -> float:
-        """See ``PaintUsed``."""
-        return self.used.emitted_cm3
-
     def laid_cm3(self, areas_m2: np.ndarray) -> np.ndarray:
         """(G,) solids that each gun laid on vertices of (V,) these areas [m2], as in a share."""
         return np.array([float(np.sum(share_um * areas_m2)) for share_um in self.shares_um])
@@ -179,16 +174,14 @@ class CommonFilm:
     def _effects(self) -> list[Effect]:
         return [effect for effect in self.guns[0].model.effects if not effect.is_neutral]
 
-    def of_guns(self, rows: slice) -> 'CommonFilm':
-        """What some of the guns laid."""
-        return CommonFilm(self.guns[rows])
-
     def layer_um(self, coats: Coats, layer: str = TOTAL) -> np.ndarray:
         """(V,) film of a layer [um], see ``Coats.films_of``.
 
         What acts on the finished film acts on each wet film by itself.
         """
-        return sum_um((sign, self.of_guns(rows).film_um) for sign, rows in coats.films_of(layer))
+        return sum_um(
+            (sign, CommonFilm(self.guns[rows]).film_um) for sign, rows in coats.films_of(layer)
+        )
 
     def layer_gauge_um(self, coats: Coats, layer: str) -> np.ndarray:
         """(V,) what a gauge shows that sees this layer alone [um]."""

@@ -64,11 +64,6 @@ class CoatFilm:
     paint: PaintUsed  # that was sprayed
 
     @property
-    def model(self) -> DepositionModel:
-        """The deposition model of its first gun."""
-        return self.guns[0].model
-
-    @property
     def mean_wet_um(self) -> float:
         """Mean film before anything evaporates [um]; NaN where its solids are not known."""
         return self.statistics.mean_um / self.paint.solids
@@ -79,7 +74,7 @@ class CoatFilm:
             'name': self.name,
             'atomizers': [gun.name for gun in self.guns],
             **self.statistics.to_dict(),
-            'paint': paint_figures(self.model, self.paint, self.statistics),
+            'paint': paint_figures(self.guns[0].model, self.paint, self.statistics),
         }
 
 

@@ -45,13 +45,6 @@ class Steps:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def of_brush(self, row: int) -> 'Steps':
-        """The sub-steps on which one of the patterns sprays."""
-        chosen = self.brush == row
-        return replace(
-            self, rows=self.rows[chosen], brush=self.brush[chosen], tracing=self.tracing[chosen]
-        )
-
 
 class FilmIntegrator:
     """Accumulates the film of a model on surface points as the path comes in.
@@ -152,7 +145,11 @@ class FilmIntegrator:
         constants, none = layout.term_constants(self.model), np.empty(0)
         terms = np.zeros((len(constants), TERMS, len(self._film)))
         for row, of_brush in enumerate(terms):
-            self._run(True, steps.of_brush(row), constants, none, none, of_brush)
+            on = steps.brush == row
+            own = replace(
+                steps, rows=steps.rows[on], brush=steps.brush[on], tracing=steps.tracing[on]
+            )
+            self._run(True, own, constants, none, none, of_brush)
         return self._in_order(terms.reshape(-1, len(self._film)))
 
     def sprayed(self, path: SprayPath) -> tuple[SprayPath, np.ndarray]:
@@ -190,13 +187,11 @@ class FilmIntegrator:
             constants.astype(self._real), self._parameters,
         )  # fmt: skip
         kernel = compile_kernel(*self._variant, separate_terms)
-
-        def paint(first_block: int, last_block: int) -> None:
-            kernel(first_block, last_block, *arguments)
-
         many = self._parallel and len(steps) * len(self._film) >= FEW_RAYS
         count = len(blocks.spheres)
-        shared_among_threads(count, paint, least_share=1 if many else count)
+        shared_among_threads(
+            count, lambda first, last: kernel(first, last, *arguments), 1 if many else count
+        )
 
     def _in_order(self, values: np.ndarray) -> np.ndarray:
         """Values (..., V) of the sorted points in the order of the caller's."""
@@ -204,11 +199,6 @@ class FilmIntegrator:
         sorted_back[..., self._blocks.order] = values
         sorted_back.flags.writeable = False  # one film is read by many
         return sorted_back
-
-    @property
-    def emitted_cm3(self) -> float:
-        """Solids that a part which catches everything would get [cm3]."""
-        return self.used.emitted_cm3
 
     @property
     def raw_um(self) -> np.ndarray:

@@ -11,8 +11,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.kernel import eq2_flux as kernel
 from paint_deposition.kernel.blocks import LARGEST_BLOCK, THREADS, Blocks
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, within_reach
-from paint_deposition.kernel.laws import Law
+from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, Law, within_reach
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints

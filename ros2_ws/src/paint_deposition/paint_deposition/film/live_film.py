@@ -123,11 +123,6 @@ class LiveFilm:
         passed = bisect_right(self._changes, self._reached_ns, key=_STAMP)
         return self._changes[max(passed - 1, 0) :]
 
-    @property
-    def _sprays_without_trigger(self) -> bool:
-        """Whether the gun sprays without a trigger; a model of several brushes must know which."""
-        return len(self.model.brushes) <= 1
-
     def reset(self) -> None:
         """Clear the film; the gun stays on or off if the motion continues."""
         self.reset_keeping_trigger_of(self)
@@ -151,7 +146,8 @@ class LiveFilm:
         self._builder = PathBuilder(
             self.max_pose_gap_s, self.model.max_step_m, self.model.needs_whole_strokes
         )
-        if not self._sprays_without_trigger:
+        # Without a trigger the gun sprays, but with several brushes it must be known which.
+        if len(self.model.brushes) > 1:
             self._builder.add_trigger(BEFORE_ALL_NS, 0.0)
         self.log = MotionLog(self._limit_poses)
         self._changes: list[TriggerChange] = []
@@ -217,7 +213,7 @@ class LiveFilm:
         Raises:
             ModelError: the model lacks a brush that was used.
         """
-        always_on = self._sprays_without_trigger and self.flow is None
+        always_on = len(self.model.brushes) <= 1 and self.flow is None
         model.require_brushes({ONLY_BRUSH} if always_on else self._brushes)
         builder = self._builder
         self._integrator.add(builder.take(self._settled_ns, finish=True))

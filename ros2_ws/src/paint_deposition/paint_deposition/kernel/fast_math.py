@@ -1,8 +1,11 @@
-"""Exponential and logarithm that a compiler can vectorise, for code inside the kernel.
+"""Exponential and logarithm that a compiler can vectorise, and vectors, for compiled code.
 
 The C library's functions are calls and stop SIMD. These are near-minimax polynomials after an
 exact range reduction, good to a few units in the last place of the result, times the magnitude
 of the exponent. Outside compiled code they are the C library's.
+
+Vectors of three numbers are rows of arrays, or tuples. Results are tuples: arrays take seconds to
+compile.
 """
 
 import math
@@ -12,7 +15,7 @@ import numpy as np
 from numba import types
 from numba.extending import overload, register_jitable
 
-from paint_deposition.kernel.compiler import named_for_its_code
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 
 # Fused multiply-add only: the rest of fast-math would cancel the rounding to an integer.
 WITHOUT_REORDERING = {'fastmath': {'contract'}}
@@ -129,3 +132,27 @@ def _horner(terms: Sequence[float]) -> Callable[[float], float]:
 
     # Symbols of compiled code from different processes can share a name: each names its terms.
     return register_jitable(named_for_its_code(nested, [], terms))
+
+
+@njit
+def dot(a, b):
+    """Scalar product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit
+def length(a):
+    """Length of a vector."""
+    return math.sqrt(dot(a, a))
+
+
+@njit
+def difference(a, b):
+    """Vector from b to a."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit
+def cross(a, b):
+    """Vector product a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

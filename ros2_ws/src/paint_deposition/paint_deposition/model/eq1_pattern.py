@@ -204,11 +204,6 @@ class Brush(SetPoints):
     number: int = Field(ge=1, le=MOST)  # by which programmes choose it
     planar: PlanarPattern
 
-    @property
-    def set_points(self) -> SetPoints:
-        """What the cell sets for it."""
-        return SetPoints(**{name: getattr(self, name) for name in SetPoints.model_fields})
-
 
 def listed(numbers: Iterable[int]) -> str:
     """Numbers of brushes in words."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import difference, length
+from paint_deposition.kernel.fast_math import difference, length
 
 # A turn of the tool moves the far end of the spray; this lever turns it into a travel [m].
 LEVER_M = 0.3

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paint_deposition.motion.part_frame import QUATERNION_TOLERANCE
 from paint_deposition.motion.stream_quality import RepeatedSamples
 from paint_deposition.motion.trajectory import ONLY_BRUSH, PoseCounts, Trajectory
+from paint_deposition.motion.transforms import QUATERNION_TOLERANCE
 
 # Two hours at 250 Hz, 64 bytes a pose.
 DEFAULT_POSE_MEMORY = 2_000_000

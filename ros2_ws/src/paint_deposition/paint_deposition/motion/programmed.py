@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered
+from paint_deposition.motion.transforms import POSE_FORMAT, is_pose
 
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
 

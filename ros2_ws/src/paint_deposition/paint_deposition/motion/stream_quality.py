@@ -196,7 +196,15 @@ class StreamQuality:
 
     def faults(self, name: str) -> list[str]:
         """What makes the stream of this name blur or distort a film, with the remedy."""
-        return [*self.repeats(name), *self.slowness(name)]
+        faults = [*self.repeats(name)]
+        if 0.0 < self.new_rate_hz < LEAST_HZ * (1.0 - 1e-3):
+            faults.append(
+                f'{name}: only {self.new_rate_hz:.3g} samples a second: between them the gun '
+                f'moves {100.0 / self.new_rate_hz:.0f} cm at 1 m/s, its corners are cut and its '
+                f'speed is blurred; record {LEAST_HZ:g} a second or more, by EGM (250) or with a '
+                'higher polling_rate of RWS'
+            )
+        return faults
 
     def repeats(self, name: str) -> Iterator[str]:
         """The fault of a driver that sends samples again, if it is one."""
@@ -205,16 +213,6 @@ class StreamQuality:
                 f'{name}: {self.repeated_samples} of {self.poses} samples repeat the one before '
                 'them under a new stamp, as of a driver that asks more often than the robot '
                 f'answers; they are dropped, and {self.new_rate_hz:.3g} a second are left'
-            )
-
-    def slowness(self, name: str) -> Iterator[str]:
-        """The fault of too few samples, if it is one."""
-        if 0.0 < self.new_rate_hz < LEAST_HZ * (1.0 - 1e-3):
-            yield (
-                f'{name}: only {self.new_rate_hz:.3g} samples a second: between them the gun '
-                f'moves {100.0 / self.new_rate_hz:.0f} cm at 1 m/s, its corners are cut and its '
-                f'speed is blurred; record {LEAST_HZ:g} a second or more, by EGM (250) or with a '
-                'higher polling_rate of RWS'
             )
 
 

@@ -42,7 +42,7 @@ import math
 import numpy as np
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, dot, length
+from paint_deposition.kernel.fast_math import cross, difference, dot, length
 
 # The path's heading is judged over this travel, so that jitter at rest is no turn [m].
 HEADING_STEP_M = 0.01

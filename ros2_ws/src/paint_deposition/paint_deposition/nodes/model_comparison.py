@@ -149,7 +149,7 @@ class ModelComparison(PaintingNode):
             readings_painted=int(residuals.painted.sum()),
             bias_um=residuals.bias_um,
             rmse_um=residuals.rmse_um,
-            rmse_painted_um=residuals.rmse_painted_um,
+            rmse_painted_um=residuals.select(residuals.painted).rmse_um,
             chi_square_per_reading=residuals.chi_square_per_reading,
             noise_floor_um=np.nan if self._noise.source == 'assumed' else self._noise.typical_um,
             worst_position=Point(x=x, y=y, z=z),

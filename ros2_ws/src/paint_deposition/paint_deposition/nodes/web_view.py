@@ -18,9 +18,8 @@ from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField,
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns, transforms_of, trigger_change
-from paint_deposition.motion.frame_tree import NoTransform
-from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
+from paint_deposition.motion.transforms import PART_POSE_TOPIC, NoTransform
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue, placed_in_order
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.runtime import topics

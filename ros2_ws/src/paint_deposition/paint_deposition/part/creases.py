@@ -1,12 +1,12 @@
 """Edges of a mesh that was read: creases, which split normals, rims and hems, and cut curves."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, dot, length
+from paint_deposition.kernel.fast_math import cross, difference, dot, length
 from paint_deposition.part.edges import (
     BLOCK,
     Edges,
@@ -15,7 +15,6 @@ from paint_deposition.part.edges import (
     half_edges_m,
     near_pairs,
     next_half_edge,
-    without_seams,
 )
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
 
@@ -102,16 +101,6 @@ def split_at_creases(
     return origin, label.reshape(-1, 3)
 
 
-def rim_segments_m(
-    vertices_m: np.ndarray, faces: np.ndarray, edges: Edges, rim: np.ndarray
-) -> np.ndarray:
-    """(B, 2, 3) ends of segments where the surface ends or, at (E,) ``rim``, folds back [m]."""
-    single = half_edges_m(vertices_m, faces, edges.single)
-    return np.concatenate(
-        [without_seams(single), half_edges_m(vertices_m, faces, edges.paired[rim, 0])]
-    )
-
-
 def strip_vertices(
     vertices_m: np.ndarray, patches: np.ndarray, hem_half_edges: np.ndarray
 ) -> np.ndarray:
@@ -168,10 +157,6 @@ class CurvedEdges:
 
     def __len__(self) -> int:
         return len(self.lengths_m)
-
-    def turned(self) -> 'CurvedEdges':
-        """The edges as seen from the surface's other side."""
-        return replace(self, normals=-self.normals, curved_normals=-self.curved_normals)
 
     def off_at(self, positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How far the curve is from the mesh at points on it, and by how much the normals turn.

@@ -1,13 +1,14 @@
 """Derivatives on the surface: its normals, its curvature, and the slope of a field on it."""
 
 import math
+from functools import partial
 
 import numpy as np
 import scipy
 
 from paint_deposition.kernel.blocks import shared_among_threads
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, dot, length
+from paint_deposition.kernel.fast_math import cross, difference, dot, length
 from paint_deposition.part.creases import RIM_FOLD_RAD
 from paint_deposition.part.edges import near_pairs, rows_by_number
 from paint_deposition.part.refinement import face_areas_m2, face_normals
@@ -31,9 +32,7 @@ def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     corner, first = rows_by_number(triangles.ravel(), len(vertices))
     normals = np.empty((len(vertices), 3))
 
-    def fill(start: int, stop: int) -> None:
-        _fill(vertices, triangles, first, corner, start, stop, normals)
-
+    fill = partial(_fill, vertices, triangles, first, corner, normals)
     shared_among_threads(len(vertices), fill)
     return normals
 
@@ -149,7 +148,7 @@ def _solved(system, work):
 
 @njit(cache=True, nogil=True, error_model='numpy')
 @named_for_its_code
-def _fill(vertices, faces, first, corner, start, stop, normals):
+def _fill(vertices, faces, first, corner, normals, start, stop):
     """Set the normals of vertices from start to stop."""
     seen = np.zeros(len(vertices), dtype=np.int32)
     passed, near = np.zeros_like(seen), np.empty_like(seen)

@@ -10,7 +10,7 @@ import numpy as np
 
 from paint_deposition.kernel.blocks import bounding_box_m
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, dot, length
+from paint_deposition.kernel.fast_math import cross, difference, dot, length
 
 # Faces in a leaf of the tree.
 LEAF = 8
@@ -181,11 +181,14 @@ def _face_hit(p, way, vertices, face):
 
 @njit(cache=True, nogil=True)
 @named_for_its_code
-def first_hits(starts, ways, vertices, faces, nodes, met):
-    """Set the row in ``faces`` of what each ray (N, 3) meets first, from either side, or -1."""
+def first_hits(starts, ways, vertices, faces, nodes, met, start, stop):
+    """Set the row in ``faces`` of what each ray (N, 3) meets first, from either side, or -1.
+
+    Of the rays from ``start`` to ``stop``.
+    """
     inner = len(nodes) // 2
     waiting, entries = np.empty(DEPTH, dtype=np.int64), np.empty(DEPTH)
-    for ray in range(len(starts)):
+    for ray in range(start, stop):
         p, way, nearest = starts[ray], ways[ray], np.inf
         met[ray] = -1
         waiting[0], entries[0], left = 0, 0.0, 1

@@ -7,7 +7,7 @@ import numpy as np
 
 from paint_deposition.errors import MeshError
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, length
+from paint_deposition.kernel.fast_math import cross, difference, length
 from paint_deposition.part.edges import edges_of
 
 
@@ -111,11 +111,6 @@ def face_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return _areas_and_normals(_double(vertices_m), faces)[1]
 
 
-def longest_edges_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(F,) lengths of the longest edges of the triangles [m]."""
-    return edge_lengths_m(vertices_m, faces).max(axis=1)
-
-
 def edge_lengths_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) lengths of the edges from each corner to the next [m]."""
     return _edge_lengths(_double(vertices_m), faces)
@@ -164,7 +159,7 @@ def refine(
     Raises:
         MeshError: it would have more than MAX_TRIANGLES triangles.
     """
-    longest_m = longest_edges_m(vertices_m, faces)
+    longest_m = edge_lengths_m(vertices_m, faces).max(axis=1)
     if len(faces) <= MAX_TRIANGLES and not np.any(longest_m > max_edge_length_m):
         return vertices_m, normals, faces
     _refuse_too_many(face_areas_m2(vertices_m, faces), longest_m, max_edge_length_m)

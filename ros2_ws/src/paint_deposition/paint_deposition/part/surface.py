@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -15,16 +15,18 @@ from paint_deposition.kernel.blocks import (
 )
 from paint_deposition.part import creases, derivatives
 from paint_deposition.part.creases import NO_EDGES, CurvedEdges
-from paint_deposition.part.edges import Edges, edge_distance_m
+from paint_deposition.part.edges import Edges, edge_distance_m, half_edges_m, without_seams
 from paint_deposition.part.face_tree import FaceTree, Location, first_hits, locate
-from paint_deposition.part.orientation import (
+from paint_deposition.part.points import (
     CANCELLED,
     ONE_SIDED,
+    SurfacePoints,
+    box_extent_m,
     gravity,
+    heights,
     mean_normal,
     outward_side,
 )
-from paint_deposition.part.points import SurfacePoints, box_extent_m, heights
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, face_normals, refine
 from paint_deposition.part.visibility import Occluder
 
@@ -96,7 +98,10 @@ class Surface:
         rim = creases.rim_folds(vertices_m, faces, edges, folds)
         smooth = (np.abs(folds) <= creases.CREASE_RAD) & ~rim
         origin, patches = creases.split_at_creases(faces, edges, smooth)
-        rim_m = creases.rim_segments_m(vertices_m, faces, edges, rim)
+        # Where the surface ends, and where it folds back.
+        single_m = half_edges_m(vertices_m, faces, edges.single)
+        folded_m = half_edges_m(vertices_m, faces, edges.paired[rim, 0])
+        rim_m = np.concatenate([without_seams(single_m), folded_m])
         strip = creases.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
         corners = vertices_m[origin]
         read_normals = derivatives.surface_normals(corners, patches)
@@ -149,10 +154,7 @@ class Surface:
         starts = np.ascontiguousarray(starts_m, dtype=np.float64)
         ways = np.ascontiguousarray(directions, dtype=np.float64)
 
-        def fill(start: int, stop: int) -> None:
-            rays = starts[start:stop], ways[start:stop]
-            first_hits(*rays, tree.vertices_m, tree.faces, tree.nodes, met[start:stop])
-
+        fill = partial(first_hits, starts, ways, tree.vertices_m, tree.faces, tree.nodes, met)
         shared_among_threads(len(starts), fill)
         return np.where(met >= 0, tree.order[met], -1)
 
@@ -267,11 +269,12 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
 
 def turned(surface: Surface) -> Surface:
     """The part with its other side outward."""
+    edges = surface.curved_edges
     return replace(
         surface,
         faces=np.ascontiguousarray(surface.faces[:, ::-1]),
         normals=-surface.normals,
-        curved_edges=surface.curved_edges.turned(),
+        curved_edges=replace(edges, normals=-edges.normals, curved_normals=-edges.curved_normals),
     )
 
 

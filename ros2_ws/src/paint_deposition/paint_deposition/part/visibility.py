@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from threading import Lock
 
 import numpy as np
@@ -11,7 +11,7 @@ from embreex.rtcore_scene import EmbreeScene
 
 from paint_deposition.kernel.blocks import box_centre_m, shared_among_threads
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.vectors import cross, difference, dot
+from paint_deposition.kernel.fast_math import cross, difference, dot
 from paint_deposition.part.derivatives import tangents
 from paint_deposition.part.face_tree import (
     DEPTH,
@@ -84,7 +84,7 @@ def _bound(p, n, node):
 
 @njit(cache=True, nogil=True)
 @named_for_its_code
-def _fill(points, normals, vertices, faces, nodes, start, stop, found):
+def _fill(points, normals, vertices, faces, nodes, found, start, stop):
     inner = len(nodes) // 2
     # Keys are bounds with the other sign: the highest is looked at first.
     waiting, keys = np.empty(DEPTH, dtype=np.int64), np.empty(DEPTH)
@@ -171,9 +171,7 @@ class Occluder:
         points = np.ascontiguousarray(points_m, dtype=np.float64)
         upward = np.ascontiguousarray(normals, dtype=np.float64)
 
-        def fill(start: int, stop: int) -> None:
-            _fill(points, upward, tree.vertices_m, tree.faces, tree.nodes, start, stop, found)
-
+        fill = partial(_fill, points, upward, tree.vertices_m, tree.faces, tree.nodes, found)
         shared_among_threads(len(points), fill)
         return found
 

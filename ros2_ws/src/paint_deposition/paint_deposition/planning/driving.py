@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.arm import Arm
-from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory, gap_ns
+from paint_deposition.motion.transforms import Rigid, moved
 from paint_deposition.planning.joints import (
     MARGIN,
     REACHED,

@@ -9,8 +9,8 @@ from scipy.ndimage import minimum_filter
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import PlanError, RecordingError
-from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.transforms import Rigid
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.joints import fastest_way, ways_of
 

@@ -9,7 +9,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import binary_closing, distance_transform_edt, gaussian_filter
 
 from paint_deposition.errors import PlanError
-from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.points import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 

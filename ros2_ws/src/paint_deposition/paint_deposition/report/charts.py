@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.effects.learned.curves import LearnedCurve, counted_from_1
-from paint_deposition.effects.learned.law import (
+from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
+from paint_deposition.effects.learned_laws import (
     LEAST_FACTOR,
     LearnedFootprint,
     LearnedMap,
@@ -121,15 +121,14 @@ def _of_each_model(data: ReportData, *values: Iterable[np.ndarray]) -> Iterator[
 def covariate_figure(data: ReportData) -> dict[str, Any] | None:
     """Residual against what differs from point to point, the most telling first."""
     covariates = data.study.covariates(data.models[0])
-    values = {c.name: counted_from_1(c.name, c.values) for c in covariates}
+    values = {name: counted_from_1(name, found) for name, found in covariates.items()}
     # Conditions that differ by less say nothing of the model.
     differing = {n for n, v in values.items() if np.ptp(v) > 0.01 * np.abs(v).max()}
-    dependences = [d for d in data.comparisons[0].dependences if d.covariate in differing]
+    dependences = [d for d in data.comparisons[0].dependences.items() if d[0] in differing]
     reach = 1.1 * max(np.abs(r).max() for r in data.residuals_um)
-    later = {d.covariate: d.correlation for d in data.comparisons[-1].dependences}
+    later = data.comparisons[-1].dependences
     charts = []
-    for dependence in dependences[:8]:
-        name = dependence.covariate
+    for name, (correlation, p_value) in dependences[:8]:
         x = values[name]
         # Means of the covariate, and of each model's residual, over sixths of the readings.
         edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, 7)))
@@ -144,10 +143,10 @@ def covariate_figure(data: ReportData) -> dict[str, Any] | None:
                 _dots(x, residual, colour, 4, opacity=0.6, hovertemplate=hover),
                 _line(x_mean, mean, colour, 2.5, hoverinfo='skip'),
             ]
-        text = f'ρ {fixed(dependence.correlation, signed=True)}'
+        text = f'ρ {fixed(correlation, signed=True)}'
         if data.improved and name in later:
-            text += f' → {fixed(later[name], signed=True)}'
-        title = f'{text}, {p_words(dependence.p_value)}'
+            text += f' → {fixed(later[name][0], signed=True)}'
+        title = f'{text}, {p_words(p_value)}'
         y_axis = _axis('residual [µm]', range=[-reach, reach], zeroline=True)
         x_axis = _axis(covariate_label(name), nticks=5)
         charts.append(_chart(title, traces, x_axis, y_axis, 220))

@@ -10,8 +10,8 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import LearnedCurve, counted_from_1
-from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap
+from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
+from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedLaw, LearnedMap
 from paint_deposition.film.common_film import sum_um
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import wanted_at
@@ -182,7 +182,9 @@ class ReportData:
                     film.add(one.path.select(rows))
                     films.append((sign, film))
                 film_um = sum_um((sign, film.film_um) for sign, film in films)
-                of_part.append((film_um, sum(sign * film.emitted_cm3 for sign, film in films)))
+                of_part.append(
+                    (film_um, sum(sign * film.used.emitted_cm3 for sign, film in films))
+                )
             found.append(of_part)
         return found
 

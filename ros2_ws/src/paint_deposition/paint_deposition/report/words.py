@@ -7,8 +7,8 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import LEARNED
-from paint_deposition.effects.learned.curves import LearnedCurve, counted_from_1
-from paint_deposition.effects.learned.law import (
+from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
+from paint_deposition.effects.learned_laws import (
     LEAST_FACTOR,
     LearnedFootprint,
     LearnedLaw,

@@ -10,9 +10,9 @@ from paint_deposition.files.atomic import MOST_TEXT_MB, filled, read_file
 from paint_deposition.files.rapid.gun import RapidProgram
 from paint_deposition.files.rapid.painting import Painting
 from paint_deposition.files.rapid.parser import Module, Routine, parse_modules
-from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory
+from paint_deposition.motion.transforms import Rigid
 
 MODULES = ('.mod', '.prg', '.sys')
 LIST_OF_MODULES = '.pgf'

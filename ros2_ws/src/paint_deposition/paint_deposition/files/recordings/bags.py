@@ -21,7 +21,6 @@ from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offe
 from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, Signal, stamp_ns
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses, read_tf_poses
 from paint_deposition.files.tables.headings import LENGTHS
-from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
 from paint_deposition.motion.trajectory import (
@@ -31,6 +30,7 @@ from paint_deposition.motion.trajectory import (
     numbered,
     relative_flow,
 )
+from paint_deposition.motion.transforms import Rigid
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot

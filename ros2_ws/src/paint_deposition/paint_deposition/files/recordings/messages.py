@@ -15,9 +15,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.part_frame import is_pose
 from paint_deposition.motion.pose_stream import FARTHEST_M, TriggerChange
 from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
+from paint_deposition.motion.transforms import is_pose
 
 SEPARATOR = '=' * 80
 # Definitions of the messages that are serialised without a ROS installation.

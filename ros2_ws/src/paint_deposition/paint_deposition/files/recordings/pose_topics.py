@@ -20,10 +20,15 @@ from paint_deposition.files.recordings.messages import (
     stamp_ns,
     transforms_of,
 )
-from paint_deposition.motion.frame_tree import FrameTree, NoTransform, began_again
-from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.transforms import (
+    PART_POSE_TOPIC,
+    FrameTree,
+    NoTransform,
+    Rigid,
+    began_again,
+)
 
 STATIC = 'tf_static'
 PART_POSE_TYPE = 'geometry_msgs/msg/TransformStamped'

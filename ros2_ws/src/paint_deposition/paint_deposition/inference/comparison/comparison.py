@@ -18,6 +18,7 @@ from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.regions import Region, misfit_regions
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.covariates import varies
 from paint_deposition.inference.readings.plausibility import geometry_by_experiment
 from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.part.zones import Zone
@@ -115,15 +116,6 @@ class Misfit:
 
 
 @dataclass(frozen=True)
-class Dependence:
-    """Residual against one covariate: Spearman's rank correlation and its p-value."""
-
-    covariate: str
-    correlation: float
-    p_value: float
-
-
-@dataclass(frozen=True)
 class Comparison(Tabular):
     """The model compared with the readings.
 
@@ -132,7 +124,8 @@ class Comparison(Tabular):
         readings: residuals of every reading used, experiments in order.
         points: residuals of the points, averaged over repeats.
         misfits: of each experiment, its groups and its passes.
-        dependences: strongest first.
+        dependences: of the residual on each covariate, by its name, strongest first: Spearman's
+            rank correlation and its p-value.
         regions: where the misfit is significant, strongest first.
         model: what was compared with the readings.
         zones: the readings of each zone of each part beside its target, if there are zones.
@@ -143,7 +136,7 @@ class Comparison(Tabular):
     readings: Residuals
     points: Residuals
     misfits: tuple[Misfit, ...]
-    dependences: tuple[Dependence, ...]
+    dependences: dict[str, tuple[float, float]]
     regions: tuple[Region, ...]
     model: DepositionModel
     zones: tuple[ZoneReadings, ...] = ()
@@ -199,7 +192,10 @@ class Comparison(Tabular):
             'misfits': [misfit.to_dict() for misfit in self.misfits],
             'zones': [zone.to_dict() for zone in self.zones],
             'regions': [region.to_dict() for region in self.regions],
-            'dependences': [asdict(dependence) for dependence in self.dependences],
+            'dependences': [
+                {'covariate': name, 'correlation': correlation, 'p_value': p_value}
+                for name, (correlation, p_value) in self.dependences.items()
+            ],
             'notes': [*self.warnings, *self.study.notes],
         }
 
@@ -239,14 +235,15 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
     predicted_um = points.predicted_um[campaign.means.owner]
     sigma_um = np.hypot(study.noise.sigma_um, study.texture_um[campaign.means.owner])
     readings = Residuals(campaign.readings.thickness_um, predicted_um, sigma_um)
-    dependences = [
-        Dependence(one.name, *map(float, spearmanr(one.values, points.residual_um)))
-        for one in study.covariates(model)
-        if one.varies
-    ]
+    dependences = {}
+    for name, values in study.covariates(model).items():
+        if varies(values):
+            correlation, p_value = map(float, spearmanr(values, points.residual_um))
+            dependences[name] = correlation, p_value
+    strongest_first = sorted(dependences.items(), key=lambda item: item[1][1])
     return Comparison(
         study, readings, points, tuple(_misfits(study, model, readings)),
-        tuple(sorted(dependences, key=lambda d: d.p_value)),
+        dict(strongest_first),
         tuple(misfit_regions(study, points, model)), model, zone_readings(campaign, readings),
     )  # fmt: skip
 

@@ -14,8 +14,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import STENCIL_M, Experiment
 from paint_deposition.inference.readings.places import FEWEST_ON_A_LINE, passes_are_level
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.orientation import STANDING_COSINE, across_axis, downhill_axis
+from paint_deposition.part.points import STANDING_COSINE, across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 
@@ -159,17 +158,14 @@ def _film_along(
     slopes = any(effect.needs_slope for model in models for effect in model.effects)
     points = experiment.surface.at(line[:, :3], line[:, 3:], STENCIL_M if slopes else None)
 
-    def integrated(model: DepositionModel, path: SprayPath) -> FilmIntegrator:
+    path, count, films = experiment.path, int(on.sum()), []
+    for model in models:
         integrator = FilmIntegrator(points, model, 'double', experiment.surface.occluder)
         integrator.add(path)
-        return integrator
-
-    path = experiment.path
-    count = int(on.sum())
-    films = [integrated(model, path).gauge_um[:count] for model in models]
+        films.append(integrator.gauge_um[:count])
     # Of a pass alone the others are kept, with the gun off.
     passes = [
-        integrated(models[-1], path.with_flow_scaled(path.spray_pass == number)).raw_um[:count]
+        integrator.raw_of(path.with_flow_scaled(path.spray_pass == number))[:count]
         for number in np.unique(path.spray_pass[path.spray_pass >= 0])
     ]
     lines = np.full((len(films) + len(passes), len(at)), np.nan)

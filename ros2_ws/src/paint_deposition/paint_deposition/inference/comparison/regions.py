@@ -38,7 +38,7 @@ def misfit_regions(study: Study, points: Residuals, model: DepositionModel) -> l
         points: residuals of the study's P points.
         model: gives the incidence that the descriptions quote.
     """
-    values = {c.name: c.values for c in study.covariates(model)}
+    values = study.covariates(model)
     random = np.random.default_rng(0)
     found = []
     for index, experiment in enumerate(study.campaign.experiments):

@@ -80,7 +80,6 @@ class Contender:
         """What it gives the readings of a study, among them those that it was fitted to.
 
         Args:
-            study: the readings.
             usual: their discrepancy around one model of all contenders.
             errors: (P, n) by which its laws are off, if they are known, see ``ways_off``.
         """

@@ -62,11 +62,9 @@ def with_proposals(diagnosis: Diagnosis, library: Mapping[str, type[Effect]]) ->
     return replace(diagnosis, library=library, proposals=proposals)
 
 
-def propose(
-    study: Study, contenders: Sequence[Contender], seed: int = 0
-) -> tuple[list[Place], list[Spray]]:
+def propose(study: Study, contenders: Sequence[Contender]) -> tuple[list[Place], list[Spray]]:
     """Places to measure on the parts at hand, and sprays, best first."""
-    return _places(study, contenders, seed), _sprays(study, contenders)
+    return _places(study, contenders), _sprays(study, contenders)
 
 
 def _sprays(study: Study, contenders: Sequence[Contender]) -> list[Spray]:
@@ -165,11 +163,11 @@ def _in_words(
     return f'{what}, on {experiment.name}' if len(study.campaign.experiments) > 1 else what
 
 
-def _places(study: Study, contenders: Sequence[Contender], seed: int) -> list[Place]:
+def _places(study: Study, contenders: Sequence[Contender]) -> list[Place]:
     """Add one point after the other, each where it tells the leading effect from its rival."""
     parts = study.campaign.experiments
     model = contenders[-1].fit.model
-    both = [_with_candidates(study, k, model, seed + k) for k in range(len(parts))]
+    both = [_with_candidates(study, k, model) for k in range(len(parts))]
     together = _together(study, both)
     part, positions_m = together.campaign.experiment_of, together.campaign.positions_m
     taken = np.concatenate([np.arange(len(b)) < len(e) for b, e in zip(both, parts, strict=True)])
@@ -197,12 +195,12 @@ def _places(study: Study, contenders: Sequence[Contender], seed: int) -> list[Pl
     return places
 
 
-def _with_candidates(study: Study, number: int, model: DepositionModel, seed: int) -> Experiment:
+def _with_candidates(study: Study, number: int, model: DepositionModel) -> Experiment:
     """A part with further readings at random points, clear of free edges, as a model predicts."""
     experiment, own = study.campaign.experiments[number], study.campaign.experiment_of == number
     surface, here = experiment.surface, experiment.measured_points
     count = 220 // len(study.campaign.experiments)
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(number)
     chosen = random.permutation(len(surface.vertices_m))[: 4 * count]
     points = surface.points().select(chosen)
     inside = chosen[points.edge_distance_m > EDGE_MARGIN_M][:count]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.orientation import across_axis
+from paint_deposition.part.points import across_axis
 
 # The gun opens this much earlier and closes this much later than it did [s].
 LONGER_OPEN_S = 0.3
@@ -46,8 +47,11 @@ def pairs(changes: Sequence[Change]) -> Iterator[Change]:
             yield together(first, second)
 
 
-def _on_path(change: Callable[[SprayPath], SprayPath]) -> Callable[[Experiment], Experiment]:
-    return lambda experiment: replace(experiment, path=change(experiment.path))
+def _on_path(
+    change: Callable[..., SprayPath], *values: float
+) -> Callable[[Experiment], Experiment]:
+    """A change of the path alone, by a function of it and these values."""
+    return lambda experiment: replace(experiment, path=change(experiment.path, *values))
 
 
 def _of_the_nearest_opening(path: SprayPath) -> SprayPath:
@@ -58,10 +62,10 @@ def _of_the_nearest_opening(path: SprayPath) -> SprayPath:
     return path.with_(brush=np.where(before, path.brush[opened[following]], path.brush))
 
 
-def _rolled(angle_deg: float) -> Callable[[Experiment], Experiment]:
+def _rolled(path: SprayPath, angle_deg: float) -> SprayPath:
     cos, sin = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    return _on_path(lambda path: path.with_(rotation=path.rotation @ turn))
+    return path.with_(rotation=path.rotation @ turn)
 
 
 def _other_way(path: SprayPath) -> SprayPath:
@@ -93,32 +97,22 @@ def _other_order(path: SprayPath) -> SprayPath:
     return path.with_(spray_pass=number, passes_before=np.maximum(number, 0), time_s=time_s)
 
 
-def _moved_off(distance_m: float) -> Callable[[Experiment], Experiment | None]:
-    def moved(experiment: Experiment) -> Experiment | None:
-        path = experiment.path
-        if distance_m < 0.0:
-            spraying = path.position_m[path.flow > 0.0]
-            standoff, _ = cKDTree(experiment.surface.vertices_m).query(spraying)
-            # The gun comes no nearer to the part [m].
-            if standoff.min() + distance_m < 0.12:
-                return None
-        position = path.position_m - distance_m * path.rotation[:, :, 2]
-        return replace(experiment, path=path.with_(position_m=position))
-
-    return moved
+def _moved_off(experiment: Experiment, distance_m: float) -> Experiment | None:
+    path = experiment.path
+    if distance_m < 0.0:
+        spraying = path.position_m[path.flow > 0.0]
+        standoff, _ = cKDTree(experiment.surface.vertices_m).query(spraying)
+        # The gun comes no nearer to the part [m].
+        if standoff.min() + distance_m < 0.12:
+            return None
+    position = path.position_m - distance_m * path.rotation[:, :, 2]
+    return replace(experiment, path=path.with_(position_m=position))
 
 
-def _flow(factor: float) -> Callable[[Experiment], Experiment]:
-    return _on_path(lambda path: path.with_flow_scaled(factor))
-
-
-def _speed(factor: float) -> Callable[[SprayPath], SprayPath]:
-    def changed(path: SprayPath) -> SprayPath:
-        times = ('time_s', 'dwell_s', 'since_on_s', 'since_off_s', 'until_on_s', 'until_off_s')
-        slower = {name: getattr(path, name) / factor for name in times}
-        return path.with_(velocity_m_per_s=factor * path.velocity_m_per_s, **slower)
-
-    return changed
+def _at_speed(path: SprayPath, factor: float) -> SprayPath:
+    times = ('time_s', 'dwell_s', 'since_on_s', 'since_off_s', 'until_on_s', 'until_off_s')
+    slower = {name: getattr(path, name) / factor for name in times}
+    return path.with_(velocity_m_per_s=factor * path.velocity_m_per_s, **slower)
 
 
 def _open_longer(path: SprayPath) -> SprayPath:
@@ -168,7 +162,7 @@ def _passes_turned(experiment: Experiment) -> Experiment | None:
     )
     # Passes that are longer or shorter now take as much more or less time.
     state = np.abs(path.velocity_m_per_s @ frame)[spraying].sum(axis=0)[:2]
-    return replace(experiment, path=_speed(1.0 / share[np.argmax(state)])(changed))
+    return replace(experiment, path=_at_speed(changed, 1.0 / share[np.argmax(state)]))
 
 
 def _upside_down(experiment: Experiment) -> Experiment:
@@ -176,22 +170,26 @@ def _upside_down(experiment: Experiment) -> Experiment:
     return replace(experiment, surface=surface).with_readings(experiment.readings)
 
 
-def _without(setting: str) -> Callable[[Experiment], Experiment]:
-    return lambda experiment: replace(experiment, switched_off=experiment.switched_off | {setting})
+def _without(experiment: Experiment, setting: str) -> Experiment:
+    return replace(experiment, switched_off=experiment.switched_off | {setting})
 
 
 AS_BEFORE = Change('', '', lambda experiment: experiment, '', 0.0)
 MENU = (
-    Change('roll_180', 'with the gun rolled 180 deg about its axis', _rolled(180.0), 'roll'),
-    Change('roll_90', 'with the gun rolled 90 deg about its axis', _rolled(90.0), 'roll'),
+    Change(
+        'roll_180', 'with the gun rolled 180 deg about its axis', _on_path(_rolled, 180.0), 'roll'
+    ),
+    Change(
+        'roll_90', 'with the gun rolled 90 deg about its axis', _on_path(_rolled, 90.0), 'roll'
+    ),
     Change('reverse_order', 'in reverse order', _on_path(_other_order), 'order'),
     Change('other_way', 'each run the other way', _on_path(_other_way), 'way'),
-    Change('further', '60 mm further off', _moved_off(0.06), 'standoff'),
-    Change('closer', '60 mm closer', _moved_off(-0.06), 'standoff'),
-    Change('half_flow', 'at half the flow', _flow(0.5), 'film'),
-    Change('double_flow', 'at twice the flow', _flow(2.0), 'film'),
-    Change('half_speed', 'at half the speed', _on_path(_speed(0.5)), 'film'),
-    Change('double_speed', 'at twice the speed', _on_path(_speed(2.0)), 'film'),
+    Change('further', '60 mm further off', partial(_moved_off, distance_m=0.06), 'standoff'),
+    Change('closer', '60 mm closer', partial(_moved_off, distance_m=-0.06), 'standoff'),
+    Change('half_flow', 'at half the flow', _on_path(SprayPath.with_flow_scaled, 0.5), 'film'),
+    Change('double_flow', 'at twice the flow', _on_path(SprayPath.with_flow_scaled, 2.0), 'film'),
+    Change('half_speed', 'at half the speed', _on_path(_at_speed, 0.5), 'film'),
+    Change('double_speed', 'at twice the speed', _on_path(_at_speed, 2.0), 'film'),
     Change(
         'longer_open', 'with the gun opened 0.3 s earlier and closed 0.3 s later',
         _on_path(_open_longer), 'trigger',
@@ -201,9 +199,12 @@ MENU = (
         'upside_down', 'with the part hung upside down and the passes turned with it',
         _upside_down, 'part', 2.0,
     ),
-    Change('voltage_off', 'with the high voltage off', _without('voltage'), 'voltage', 2.0),
     Change(
-        'draught_off', 'with the booth air off, if safety allows', _without('draught'), 'draught',
-        3.0,
+        'voltage_off', 'with the high voltage off', partial(_without, setting='voltage'),
+        'voltage', 2.0,
+    ),
+    Change(
+        'draught_off', 'with the booth air off, if safety allows',
+        partial(_without, setting='draught'), 'draught', 3.0,
     ),
 )  # fmt: skip

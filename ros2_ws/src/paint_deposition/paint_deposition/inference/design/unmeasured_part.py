@@ -17,12 +17,11 @@ from paint_deposition.inference.diagnosis.explanations import (
 )
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import EffectEvidence
-from paint_deposition.inference.diagnosis.testability import power_along
+from paint_deposition.inference.diagnosis.proposals import power_along
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
@@ -106,5 +105,5 @@ class UnmeasuredPart:
                 strength = float(np.linalg.norm(column))
                 direction = (-column if side < 0.0 else column) / max(strength, 1e-12)
                 chance = power_along(space, direction, np.array([strength]), null, draws)[0]
-                found.setdefault(law.id, []).append(float(chance))
+                found.setdefault(law.effect.id, []).append(float(chance))
         return {name: float(np.mean(chances)) for name, chances in sorted(found.items())}

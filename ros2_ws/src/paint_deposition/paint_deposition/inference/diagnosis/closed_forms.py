@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.learned.curves import LearnedCurve, counted_from_1
+from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
 
 # So many knots count at least, where they are off alike: one more than a form's parameters.
 LEAST_KNOTS = 5

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import HARMONICS, WAVES
+from paint_deposition.effects.learned_laws import HARMONICS, WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.smooth_laws import (
     RandomLaw,
@@ -323,11 +323,10 @@ def painted_alike(experiments: Sequence[Experiment]) -> np.ndarray:
 
 
 def _alike(first: Experiment, second: Experiment) -> bool:
-    def sameness(experiment: Experiment) -> tuple[object, ...]:
-        extent = tuple(np.round(experiment.measured_points.extent_m, 3))
-        return experiment.switched_off, experiment.brushes, extent
-
-    if sameness(first) != sameness(second):
+    if (first.switched_off, first.brushes) != (second.switched_off, second.brushes):
+        return False
+    extents = [np.round(e.measured_points.extent_m, 3) for e in (first, second)]
+    if not np.array_equal(extents[0], extents[1]):
         return False
     clocks = [np.cumsum(e.path.flow * e.path.dwell_s) for e in (first, second)]
     # Paths are the same that keep within a share of the time, a distance [m] and an angle [rad].

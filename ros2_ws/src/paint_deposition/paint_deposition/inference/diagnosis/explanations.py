@@ -13,8 +13,8 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.effects.learned.law import LearnedFootprint, LearnedMap
+from paint_deposition.effects.learned_curves import CURVES
+from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedMap
 from paint_deposition.inference.diagnosis.discrepancy import Footprints
 from paint_deposition.inference.diagnosis.smooth_laws import (
     NEGLIGIBLE,
@@ -27,6 +27,7 @@ from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.random_effects import root_of_field
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.covariates import varies
 
 # Amplitudes are stepped by this share of their typical size.
 STEP = 0.25
@@ -43,11 +44,6 @@ class Sensitivity:
     # (n,) bounds of the amplitudes, from neutral, in typical sizes.
     low: np.ndarray
     high: np.ndarray
-
-    @property
-    def id(self) -> str:
-        """The effect's id."""
-        return self.effect.id
 
     @property
     def sides(self) -> np.ndarray:
@@ -93,8 +89,6 @@ def sensitivity_um(
     """(P,) change of the predicted readings by an amplitude, in its typical size [um].
 
     Args:
-        forward: predicts the points.
-        model: where to linearise.
         effect: as it is there, in the model or neutral.
         name: of the amplitude; a bound beside it makes the difference one-sided.
         predicted_um: (P,) by the model with the effect.
@@ -115,8 +109,6 @@ def sensitivity(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray
     """Differentiate the prediction by the effect's amplitudes at the fitted model.
 
     Args:
-        forward: predicts the points.
-        fit: where to linearise.
         effect: neutral, or as it is in the fitted model.
         sigma_um: (P,) standard deviation of the points [um].
     """
@@ -189,7 +181,6 @@ def of_effects(
     """The laws of effects that may be missing beside a fitted model.
 
     Args:
-        study: the readings.
         fit: where to linearise; effects that are part of its model explain nothing more.
         candidates: effects in the shapes to try, by id.
     """
@@ -221,7 +212,6 @@ def of_places(study: Study, model: DepositionModel, each: bool = False) -> list[
     """Smooth factors on the film over places of a part, for what no covariate carries.
 
     Args:
-        study: the readings.
         model: whose film they are factors on.
         each: only on one part at a time, not on all together.
     """
@@ -240,8 +230,6 @@ def of_corrections(study: Study, fit: Fit, names: frozenset[str]) -> list[Explan
     """Curves over their own covariates by which the laws of effects in a model may be off.
 
     Args:
-        study: the readings.
-        fit: of the model.
         names: ids of the effects. One that a part lacks has no such curve: curves act on all.
     """
     return [
@@ -255,8 +243,6 @@ def of_footprint(study: Study, fit: Fit, worth: float = WORTH_LEARNING) -> list[
     """Deviations of the footprint from the two Gaussians of eq. (1) that fit best.
 
     Args:
-        study: the readings.
-        fit: of the model.
         worth: log evidence that they must add to be learned.
     """
     if fit.model.effect(LearnedFootprint.id) is not None:
@@ -269,8 +255,6 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str], model: DepositionMo
     """(P, n) directions over the noise in which the laws of effects in a model may be off.
 
     Args:
-        study: the readings.
-        fit: of the model.
         kept: ids of the effects.
         model: whose rays say over which values of the covariates; one like it.
     """
@@ -320,9 +304,9 @@ def _off_anywhere(
 def standardised(study: Study, model: DepositionModel) -> dict[str, np.ndarray]:
     """(P,) covariates that vary, in their standard deviations from the mean."""
     return {
-        c.name: (c.values - c.values.mean()) / c.values.std()
-        for c in study.covariates(model)
-        if c.varies
+        name: (values - values.mean()) / values.std()
+        for name, values in study.covariates(model).items()
+        if varies(values)
     }
 
 

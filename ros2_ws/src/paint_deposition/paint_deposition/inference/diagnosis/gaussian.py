@@ -48,7 +48,6 @@ class NullModel:
         """Linear around a fit, with nuisance directions (P, n) over the noise.
 
         Args:
-            fit: of the model.
             nuisance: directions that carry no meaning.
             discrepancy: (P, P) covariance of the discrepancy.
         """

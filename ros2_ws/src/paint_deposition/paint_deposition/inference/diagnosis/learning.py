@@ -4,8 +4,7 @@ They are chosen one after the other by their evidence beside everything that the
 and kept only if they improve the prediction of readings left out.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -27,6 +26,7 @@ from paint_deposition.inference.diagnosis.search import EffectSet, SearchStage
 from paint_deposition.inference.diagnosis.verdict import Unknown
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.covariates import varies
 
 MOST_LAWS = 2
 # Share by which a law must lower the error on readings left out.
@@ -35,56 +35,45 @@ LEAST_GAIN = 0.02
 Sized = tuple[Explanation, float]
 
 
-@dataclass(frozen=True)
-class NullModels:
-    """What a law of each kind must say more than."""
+# Null hypotheses by what kind of law must say more than them, see ``nulls_around``.
+Nulls = Mapping[str, NullModel]
+CORRECTION, OTHER = 'correction', 'other'
 
-    # For a footprint: pattern, nuisance, what the accepted laws may be off by, and the discrepancy
-    # of parts and settings.
-    footprint: NullModel
-    # For a correction of an accepted law: the same with the footprint, without what the laws may
-    # be off by.
-    correction: NullModel
-    # For a map: all of it, with the usual discrepancy of parts and settings; the most probable may
-    # be what is unknown.
-    place: NullModel
-    nonparametric_laws: NullModel  # for all others: all of it
 
-    @staticmethod
-    def around(best: EffectSet, fit: Fit) -> 'NullModels':
-        """Null hypotheses beside a set of effects, and a fit of the model with it."""
-        study, sizes, discrepancy = best.state.study, best.best.sizes, best.discrepancy
-        plain = NullModel.around(fit, study.nuisance)
-        off = law_errors(study, fit, best.names, best.usual.model)
-        correction = plain.with_discrepancy(discrepancy.covariance(sizes))
-        return NullModels(
-            plain.with_discrepancy(discrepancy.of_parts(sizes)).beside(off),
-            correction,
-            plain.with_discrepancy(discrepancy.covariance(discrepancy.usual(sizes))).beside(off),
-            correction.beside(off),
-        )
+def nulls_around(best: EffectSet, fit: Fit) -> Nulls:
+    """What a law of each kind must say more than, beside a set of effects and a fit with it."""
+    study, sizes, discrepancy = best.state.study, best.best.sizes, best.discrepancy
+    plain = NullModel.around(fit, study.nuisance)
+    off = law_errors(study, fit, best.names, best.usual.model)
+    correction = plain.with_discrepancy(discrepancy.covariance(sizes))
+    usual = plain.with_discrepancy(discrepancy.covariance(discrepancy.usual(sizes)))
+    return {
+        # Pattern, nuisance, what the accepted laws may be off by, and the discrepancy of parts
+        # and settings.
+        FOOTPRINT: plain.with_discrepancy(discrepancy.of_parts(sizes)).beside(off),
+        # Of an accepted law: the same with the footprint, without what the laws may be off by.
+        CORRECTION: correction,
+        # All of it, with the usual discrepancy of parts and settings; the most probable may be
+        # what is unknown.
+        PLACE: usual.beside(off),
+        # All of it.
+        OTHER: correction.beside(off),
+    }
 
-    def of(self, explanation: Explanation) -> NullModel:
-        """The null hypothesis for an explanation."""
-        if explanation.corrects:
-            return self.correction
-        kinds = {FOOTPRINT: self.footprint, PLACE: self.place}
-        return kinds.get(explanation.learns, self.nonparametric_laws)
 
-    def beside(self, columns: np.ndarray) -> 'NullModels':
-        """Null hypotheses where some directions (P, n) may vary, too."""
-        return self._each(lambda null: null.beside(columns))
+def null_for(nulls: Nulls, explanation: Explanation) -> NullModel:
+    """The null hypothesis for an explanation."""
+    kind = CORRECTION if explanation.corrects else explanation.learns
+    return nulls.get(kind, nulls[OTHER])
 
-    def select(self, rows: np.ndarray) -> 'NullModels':
-        """Null hypotheses for some of the readings."""
-        return self._each(lambda null: null.select(rows))
 
-    def _each(self, change: Callable[[NullModel], NullModel]) -> 'NullModels':
-        return NullModels(*(change(getattr(self, each.name)) for each in fields(self)))
+def of_readings(nulls: Nulls, rows: np.ndarray) -> Nulls:
+    """The null hypotheses for some of the readings."""
+    return {kind: null.select(rows) for kind, null in nulls.items()}
 
 
 def choose_laws(
-    nulls: NullModels, explanations: Sequence[Explanation], freedom: float
+    nulls: Nulls, explanations: Sequence[Explanation], freedom: float
 ) -> list[tuple[int, float]]:
     """The laws that the readings call for, strongest first.
 
@@ -103,7 +92,7 @@ def choose_laws(
             (float(value), k, float(size))
             for k, explanation in left.items()
             for value, size in zip(
-                by_size(nulls.of(explanation), explanation, freedom), SIZES, strict=True
+                by_size(null_for(nulls, explanation), explanation, freedom), SIZES, strict=True
             )
             if value >= explanation.worth
         ]
@@ -112,7 +101,8 @@ def choose_laws(
         _, k, size = max(worth)
         chosen.append((k, size))
         # What was chosen may vary from now on, too.
-        nulls = nulls.beside(size * left[k].columns)
+        columns = size * left[k].columns
+        nulls = {kind: null.beside(columns) for kind, null in nulls.items()}
         left = {number: e for number, e in left.items() if e.learns != left[k].learns}
     return chosen
 
@@ -205,7 +195,7 @@ class LeftOut:
                 break
         else:
             found = self.final
-        nulls = NullModels.around(found, found.fit).select(~out)
+        nulls = of_readings(nulls_around(found, found.fit), ~out)
         laws = choose_laws(nulls, [option.select(~out) for option in options], freedom)
         learned = [size * options[k].columns for k, size in laws]
         films_um = [study.predicted_without_um(found.fit, out)]
@@ -221,7 +211,6 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     The p-value is that of the maximum over all covariates if sprays differed as usual ones do.
 
     Args:
-        study: the readings.
         fit: the model so far.
         nothing: whose discrepancy is that of the sprays.
         seed: of the simulated deviations.
@@ -230,19 +219,21 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     null = NullModel.around(fit, study.nuisance, discrepancy=usual)
     draws = simulated(len(study), study.noise.degrees_of_freedom, DRAWS, seed)
     found, by_chance = [], np.zeros(DRAWS)
-    for covariate in filter(lambda c: c.varies, study.covariates(fit.model)):
-        smooth = _smooth(covariate.values) / study.sigma_um[:, np.newaxis]
+    covariates = study.covariates(fit.model)
+    for name in (name for name, values in covariates.items() if varies(values)):
+        smooth = _smooth(covariates[name]) / study.sigma_um[:, np.newaxis]
         directions, _ = np.linalg.qr(null.whiten(smooth))
-        found.append((float(np.sum((directions.T @ null.deviation) ** 2)), covariate))
+        found.append((float(np.sum((directions.T @ null.deviation) ** 2)), name))
         by_chance = np.maximum(by_chance, np.sum((directions.T @ draws) ** 2, axis=0))
     strength, covariate = max(found, key=lambda item: item[0])
-    smooth = np.column_stack([np.ones(len(study)), _smooth(covariate.values)])
+    values = covariates[covariate]
+    smooth = np.column_stack([np.ones(len(study)), _smooth(values)])
     weights = 1.0 / study.sigma_um[:, np.newaxis]
     residuals = study.residuals(fit.predicted_um)
     coefficients, *_ = np.linalg.lstsq(
         smooth * weights, residuals.residual_um / study.sigma_um, rcond=None
     )
-    order = np.argsort(covariate.values)
+    order = np.argsort(values)
     points = order[np.linspace(0, len(order) - 1, 15).astype(int)]
     regions = misfit_regions(study, residuals, fit.model)
     names = [experiment.name for experiment in study.campaign.experiments]
@@ -251,10 +242,10 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     first = max(regions, key=lambda region: abs(region.mean_residual_um), default=None)
     mean_um = float(np.mean(study.measured_um[first.rows])) if first else np.nan
     return Unknown(
-        covariate.name,
+        covariate,
         float((1 + np.count_nonzero(by_chance >= strength)) / (1 + DRAWS)),
         {
-            covariate.name: covariate.values[points].tolist(),
+            covariate: values[points].tolist(),
             'residual_um': (smooth[points] @ coefficients).tolist(),
         },
         first.description if first else 'no single place stands out',

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import expit
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.learned.law import WAVES
+from paint_deposition.effects.learned_laws import WAVES
 from paint_deposition.inference.diagnosis.discrepancy import (
     PRIOR,
     DiscrepancyHyperparameters,
@@ -66,10 +66,7 @@ LOG_ODDS_UNKNOWN = log_odds(PRIOR_UNKNOWN) - float(np.log(2.0))
 class EffectEvidence:
     """Log evidence of each explanation alone, against one null model.
 
-    Args:
-        null: the null hypothesis.
-        explanations: of all causes.
-        freedom: degrees of freedom of the noise estimate.
+    ``freedom`` are the degrees of freedom of the noise estimate.
     """
 
     def __init__(
@@ -166,7 +163,6 @@ class ModelSpace:
 
     Args:
         weighed: the null hypothesis at the sizes of the discrepancy that matter.
-        explanations: of all causes.
         discrepancy: what the sizes are of.
         freedom: degrees of freedom of the noise estimate.
     """

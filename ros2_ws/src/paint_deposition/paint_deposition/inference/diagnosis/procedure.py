@@ -25,16 +25,16 @@ from paint_deposition.inference.diagnosis.explanations import (
 )
 from paint_deposition.inference.diagnosis.learning import (
     LeftOut,
-    NullModels,
     choose_laws,
     locate_unexplained,
+    nulls_around,
 )
+from paint_deposition.inference.diagnosis.proposals import testability
 from paint_deposition.inference.diagnosis.search import EffectSet, Group, Search, SearchStage
 from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
-from paint_deposition.inference.diagnosis.testability import testability
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
 
@@ -150,7 +150,7 @@ def _learn(state: DiagnosisState, best: EffectSet, left_out: LeftOut) -> Diagnos
     A law that the model cannot be fitted with, or that makes a part worse, is not tried again.
     """
     without: frozenset[str] = frozenset()
-    nulls = NullModels.around(best, state.fit)
+    nulls = nulls_around(best, state.fit)
     while True:
         left = [option for option in left_out.options if option.learns not in without]
         laws = [(left[k], size) for k, size in choose_laws(nulls, left, state.freedom)]

@@ -9,7 +9,7 @@ from scipy.special import expit, logsumexp
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.errors import ModelError
 from paint_deposition.inference.diagnosis.explanations import (
     ADDITION_UM,
@@ -18,7 +18,14 @@ from paint_deposition.inference.diagnosis.explanations import (
     Explanation,
     of_random,
 )
-from paint_deposition.inference.diagnosis.learning import NullModels, by_size, locate_unexplained
+from paint_deposition.inference.diagnosis.learning import (
+    Nulls,
+    by_size,
+    locate_unexplained,
+    null_for,
+    nulls_around,
+    of_readings,
+)
 from paint_deposition.inference.diagnosis.model_space import SIZES, SURE, inclusion_of
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.search import EffectSet, Search
@@ -26,7 +33,7 @@ from paint_deposition.inference.diagnosis.smooth_laws import bases_over
 from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.inference.fitting.least_squares import on_one_thread
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
 
@@ -102,7 +109,7 @@ def _with_learned(
     state: DiagnosisState, law: type[LearnedLaw], nothing: EffectSet, p_value: float
 ) -> Diagnosis:
     """The model with a law over the covariate, whatever its evidence beside what may vary."""
-    options, nulls = _options(state, law), NullModels.around(nothing, state.fit)
+    options, nulls = _options(state, law), nulls_around(nothing, state.fit)
     weights = _log_bayes_factors(state, nulls, options)
     probability = float(expit(logsumexp(weights) - np.log(weights.size)))
     before, fit = state.history[-1], state.learned([_best(options, weights)])
@@ -110,7 +117,7 @@ def _with_learned(
     def without(out: np.ndarray) -> np.ndarray:
         # The law's kind, length and size are chosen without these readings, too.
         kept = [explanation.select(~out) for explanation in options]
-        others = _log_bayes_factors(state, nulls.select(~out), kept)
+        others = _log_bayes_factors(state, of_readings(nulls, ~out), kept)
         explanation, size = _best(options, others)
         return state.study.predicted_without_um(state.fit, out, size * explanation.columns)
 
@@ -144,10 +151,10 @@ def _options(state: DiagnosisState, law: type[LearnedLaw]) -> list[Explanation]:
 
 
 def _log_bayes_factors(
-    state: DiagnosisState, nulls: NullModels, options: Sequence[Explanation]
+    state: DiagnosisState, nulls: Nulls, options: Sequence[Explanation]
 ) -> np.ndarray:
     """(n, S) log Bayes factor of each law at each size."""
-    return np.array([by_size(nulls.of(option), option, state.freedom) for option in options])
+    return np.array([by_size(null_for(nulls, one), one, state.freedom) for one in options])
 
 
 def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanation, float]:

@@ -270,7 +270,10 @@ class Search:
                 here = again
                 continue
             if not here.names and stage.chosen() is not here:
-                stage = replace(stage, tried=[*stage.tried, *self._pairs(stage)])
+                # Two effects together: alone, each of them may fit worse than a third one.
+                leading = sorted(stage.tried, key=lambda one: -one.log_weight)[:LEADING]
+                pairs = [self.with_effect(one, name) for one in leading for name in one.proposed]
+                stage = replace(stage, tried=[*stage.tried, *pairs])
             best = stage.chosen()
             if best is here:
                 return [*found, stage]
@@ -303,11 +306,6 @@ class Search:
         for start in (replace(nothing, usual=best.usual, sizes=best.sizes), best):
             self.nothing = self._refitted({}, start)
         return self.nothing
-
-    def _pairs(self, stage: SearchStage) -> list[EffectSet]:
-        """Two effects together: alone, each of them may fit worse than a third one."""
-        leading = sorted(stage.tried, key=lambda one: -one.log_weight)[:LEADING]
-        return [self.with_effect(one, name) for one in leading for name in one.proposed]
 
     def _in_another_pattern(self, stage: SearchStage) -> EffectSet:
         """The set of a stage, where a larger one has led to a pattern that suits it better."""

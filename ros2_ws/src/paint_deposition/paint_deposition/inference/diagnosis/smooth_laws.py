@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, knot_positions
-from paint_deposition.effects.learned.law import (
+from paint_deposition.effects.learned_curves import CURVES, LearnedCurve, knot_positions
+from paint_deposition.effects.learned_laws import (
     WAVES,
     LearnedFootprint,
     LearnedLaw,
@@ -139,7 +139,6 @@ def curve_basis(
     Lengths of correlation are in standard deviations of the covariate over the points.
 
     Args:
-        study: the readings.
         model: whose rays and pattern say what arrives where.
         covariate: one that a learned curve can have.
         kind: 'factor' on what arrives, or 'addition' to the film.
@@ -218,7 +217,6 @@ def footprint_basis(study: Study, model: DepositionModel, radii: int = RADII) ->
     brushes.
 
     Args:
-        study: the readings.
         model: its patterns and projection.
         radii: how many knots from the middle to the end of the pattern.
     """

@@ -13,14 +13,14 @@ from scipy.special import fdtr
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.inference.diagnosis.explanations import (
     Explanation,
     candidates_beside,
     nonparametric_laws_of,
     of_places,
 )
-from paint_deposition.inference.diagnosis.testability import Testability
+from paint_deposition.inference.diagnosis.proposals import Testability
 from paint_deposition.inference.diagnosis.verdict import (
     Diagnosis,
     EffectClass,
@@ -32,10 +32,9 @@ from paint_deposition.inference.diagnosis.verdict import (
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, estimates
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.posterior import prior_for
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
 # Starts of the first fit.
@@ -258,7 +257,7 @@ def intervals(fit: Fit, effect_id: str) -> dict[str, Interval]:
 
 def trouble_with(study: Study, fit: Fit) -> str:
     """Why the fit cannot be right, '' if it can."""
-    if wrong := [mistake.sentence for mistake in study.mistakes if mistake.stops]:
+    if wrong := [sentence for sentence, stops in study.mistakes if stops]:
         return '; '.join(wrong)
     mean = float(np.mean(study.measured_um))
     # So many standard deviations above the prediction the gauge found paint; below this share of

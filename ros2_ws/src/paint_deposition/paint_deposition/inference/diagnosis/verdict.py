@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
@@ -17,10 +17,10 @@ from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.panel import Panel
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.posterior import PatternShift, posterior_of
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
 from paint_deposition.tabular import Tabular
 
@@ -225,7 +225,7 @@ class Diagnosis(Tabular):
     @property
     def left_out(self) -> str:
         """What is left out in turn for the error that was not fitted: parts or patches."""
-        return 'parts' if self.study.has_several_parts else 'patches'
+        return 'parts' if len(self.study.campaign.experiments) > 1 else 'patches'
 
     @cached_property
     def worse(self) -> tuple[str, ...]:
@@ -251,11 +251,6 @@ class Diagnosis(Tabular):
         return posterior_of(step.fit, self.study.campaign, self.discrepancy)
 
     @property
-    def noise_floor_um(self) -> float:
-        """Standard deviation of the points: gauge, texture, and what facets cost [um]."""
-        return self.study.noise_floor_um
-
-    @property
     def model(self) -> DepositionModel:
         """The model with what was accepted."""
         return self.history[-1].model
@@ -274,6 +269,7 @@ class Diagnosis(Tabular):
         """The content of ``diagnosis.json``."""
         before, after = self.history[0], self.history[-1]
         predicted = before.fit.predicted_um, after.fit.predicted_um
+        noise_um = self.study.noise_floor_um
         places, sprays = self.proposals
         classes = []
         for found in self.classes:
@@ -292,9 +288,9 @@ class Diagnosis(Tabular):
                 'after': after.rmse_um,
                 'holdout_before': before.holdout_rmse_um,
                 'holdout_after': after.holdout_rmse_um,
-                'beyond_noise_before': before.beyond_noise_um(self.noise_floor_um),
-                'beyond_noise_after': after.beyond_noise_um(self.noise_floor_um),
-                'noise_floor': self.noise_floor_um,
+                'beyond_noise_before': before.beyond_noise_um(noise_um),
+                'beyond_noise_after': after.beyond_noise_um(noise_um),
+                'noise_floor': noise_um,
                 'left_out': 'experiments' if self.left_out == 'parts' else 'points',
             },
             'experiments': [

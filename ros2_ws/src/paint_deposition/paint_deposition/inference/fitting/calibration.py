@@ -33,10 +33,9 @@ from paint_deposition.inference.fitting.panel import (
     shifts,
     short_reaches,
 )
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.posterior import posterior_of, with_brushes_of
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import (
     FEWEST_POINTS,
@@ -281,7 +280,7 @@ def brush_figures(model: DepositionModel, parameters: Sequence[Estimate]) -> dic
         name = f'brush_{brush.number}.K1_cm3_per_s' if several else 'K1_cm3_per_s'
         known = not math.isnan(share)
         by_number[str(brush.number)] = {
-            **brush.set_points.model_dump(exclude_none=True),
+            **brush.model_dump(exclude={'number', 'planar'}, exclude_none=True),
             'transfer_efficiency': share if known else None,
             'transfer_efficiency_sigma': share * relative[name] if known else None,
         }

@@ -25,9 +25,8 @@ from paint_deposition.inference.fitting.outliers import (
     Outlier,
     find_outliers,
 )
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
 

@@ -38,8 +38,13 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
     # A parameter was measured if its width has fallen below this share of its weak prior's.
     learned = np.sqrt(np.diag(covariance)) <= 0.5 * fit.parameters.weak_prior.width
     values = fit.parameters.values(fit.vector[np.newaxis])[0]
-    low, high = _intervals(fit, covariance, values)
     pattern, found = fit.parameters.pattern, []
+    random = np.random.default_rng(0)
+    vectors = random.multivariate_normal(fit.vector, covariance, 4000, method='cholesky')
+    inside = np.clip(vectors, *fit.parameters.bounds)
+    away = _around_phase(fit.parameters.values(inside), values, pattern)
+    # Ends of the 95 % intervals.
+    low, high = values + np.quantile(away, (0.025, 0.975), axis=0)
     for k, name in enumerate(_names(fit)):
         row, place = divmod(k, len(PATTERN_NAMES))
         if row < pattern.count:
@@ -77,7 +82,8 @@ def scaled_covariance(fit: Fit, shifts: np.ndarray | None = None) -> np.ndarray:
     deviations of their own directions.
     """
     data = fit.jacobian.T @ fit.jacobian / max(fit.chi_square_per_freedom, 1.0)
-    covariance = np.linalg.inv(data + fit.parameters.prior.precision)
+    whitening = fit.parameters.prior.whitening
+    covariance = np.linalg.inv(data + whitening.T @ whitening)
     return covariance if shifts is None else covariance + shifts.T @ shifts
 
 
@@ -103,18 +109,6 @@ def _spread(fit: Fit, covariance: np.ndarray) -> np.ndarray:
     change = _around_phase(parameters.values(up), parameters.values(down), parameters.pattern)
     by_vector = (change / (up - down).sum(axis=1, keepdims=True)).T
     return by_vector @ covariance @ by_vector.T
-
-
-def _intervals(
-    fit: Fit, covariance: np.ndarray, values: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """(k,) ends of the 95 % intervals."""
-    random = np.random.default_rng(0)
-    vectors = random.multivariate_normal(fit.vector, covariance, 4000, method='cholesky')
-    inside = np.clip(vectors, *fit.parameters.bounds)
-    away = _around_phase(fit.parameters.values(inside), values, fit.parameters.pattern)
-    low, high = np.quantile(away, (0.025, 0.975), axis=0)
-    return values + low, values + high
 
 
 def _pattern_reason(

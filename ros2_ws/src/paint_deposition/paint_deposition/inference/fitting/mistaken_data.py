@@ -28,7 +28,7 @@ from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.plausibility import check_unit
 from paint_deposition.kernel.blocks import box_centre_m
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.points import across_axis, downhill_axis
 
 # Prior probability that a campaign has a mistake of a kind, shared by all hypotheses of the kind.
 PRIOR_PROBABILITY = {'mirrored': 1e-3, 'exchanged': 1e-3, 'unit': 0.01, 'gun': 0.01}
@@ -170,7 +170,7 @@ def fitted_points(study: Study, fit: Fit) -> FittedPoints:
     return FittedPoints(
         fit.residual * study.sigma_um, fit.predicted_um, study.gauge_um,
         free * study.sigma_um[:, np.newaxis], study.campaign.experiment_of,
-        study.campaign.positions_m, tuple(study.covariates(fit.model)),
+        study.campaign.positions_m, study.covariates(fit.model),
     )  # fmt: skip
 
 
@@ -206,7 +206,7 @@ def find_mistakes(study: Study, fit: Fit, start: DepositionModel) -> tuple[Mista
             break
         if way.kind in PLACES and as_given.displaced.log_weight > best - LEAST_LOG_ODDS:
             break
-        found.append(Mistake(_sentence(way, as_given, meant), way.of_this_gun))
+        found.append((_sentence(way, as_given, meant), way.of_this_gun))
         as_given = meant
     return tuple(found)
 

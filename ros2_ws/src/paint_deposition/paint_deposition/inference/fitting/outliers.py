@@ -10,7 +10,7 @@ hyperparameters integrated over a grid). Each predicts every reading from all th
 closed form (Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006, section 5.4.2).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -21,7 +21,7 @@ from scipy.special import expit, logsumexp
 from scipy.stats import norm
 
 from paint_deposition.inference.fitting.random_effects import root_of_field
-from paint_deposition.inference.readings.covariates import Covariate
+from paint_deposition.inference.readings.covariates import varies
 
 # The film's texture, as a share of it: what is usual, within a factor of two, and what may be.
 USUAL_TEXTURE = 0.01
@@ -42,18 +42,31 @@ class FittedPoints:
     free_um: np.ndarray  # (P, n) directions in which the model may be off, for unit amplitudes
     experiment_of: np.ndarray  # (P,) part of each point
     positions_m: np.ndarray  # (P, 3)
-    covariates: tuple[Covariate, ...]  # of the points
+    covariates: Mapping[str, np.ndarray]  # (P,) each, by name
 
     @cached_property
     def leave_one_out(self) -> 'LeaveOneOut':
         """Leave-one-out predictions of the readings by all models."""
-        return LeaveOneOut.of(self)
+        log_prior = norm.logpdf(np.log(TEXTURES / USUAL_TEXTURE) / np.log(2.0))
+        found, residual = [], self.residual_um
+        for field, log_share in _fields(self):
+            directions = np.hstack([self.free_um, field])
+            for texture, log_texture in zip(TEXTURES, log_prior, strict=True):
+                variance = self.gauge_um**2 + (texture * self.predicted_um) ** 2
+                solved, log_det = _solved(variance, directions)
+                weighted = residual / variance - solved.T @ (solved @ residual)
+                diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
+                likelihood = float(-0.5 * (residual @ weighted + log_det))
+                mean, sigma = residual - weighted / diagonal, diagonal**-0.5
+                found.append((likelihood + log_share + log_texture, texture, mean, sigma))
+        log_weight, textures, mean, sigma = (np.array(of) for of in zip(*found, strict=True))
+        return LeaveOneOut(log_weight, textures, mean, sigma, residual)
 
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
         names = [one.name for one in fields(self) if one.name != 'covariates']
         arrays: dict[str, Any] = {name: getattr(self, name)[rows] for name in names}
-        some = tuple(Covariate(c.name, c.values[rows]) for c in self.covariates)
+        some = {name: values[rows] for name, values in self.covariates.items()}
         return replace(self, covariates=some, **arrays)
 
 
@@ -66,24 +79,6 @@ class LeaveOneOut:
     expected_um: np.ndarray  # (M, P) residual that the other readings predict
     sigma_um: np.ndarray  # (M, P) standard deviation of that prediction
     residual_um: np.ndarray  # (P,)
-
-    @staticmethod
-    def of(misfit: FittedPoints) -> 'LeaveOneOut':
-        """Compute all models."""
-        log_prior = norm.logpdf(np.log(TEXTURES / USUAL_TEXTURE) / np.log(2.0))
-        found, residual = [], misfit.residual_um
-        for field, log_share in _fields(misfit):
-            directions = np.hstack([misfit.free_um, field])
-            for texture, log_texture in zip(TEXTURES, log_prior, strict=True):
-                variance = misfit.gauge_um**2 + (texture * misfit.predicted_um) ** 2
-                solved, log_det = _solved(variance, directions)
-                weighted = residual / variance - solved.T @ (solved @ residual)
-                diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
-                likelihood = float(-0.5 * (residual @ weighted + log_det))
-                mean, sigma = residual - weighted / diagonal, diagonal**-0.5
-                found.append((likelihood + log_share + log_texture, texture, mean, sigma))
-        log_weight, textures, mean, sigma = (np.array(of) for of in zip(*found, strict=True))
-        return LeaveOneOut(log_weight, textures, mean, sigma, misfit.residual_um)
 
     @property
     def texture_share(self) -> float:
@@ -126,7 +121,8 @@ def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
     apart = np.column_stack([misfit.positions_m, 1e6 * misfit.experiment_of])
     # Lengths of correlation: over the part [m], over a covariate in its standard deviations.
     over_part = [root_of_field(apart, length, NEGLIGIBLE) for length in (0.1, 0.25)]
-    scaled = [(c.values - c.values.mean()) / c.values.std() for c in misfit.covariates if c.varies]
+    differing = [values for values in misfit.covariates.values() if varies(values)]
+    scaled = [(values - values.mean()) / values.std() for values in differing]
     over = [root_of_field(values, 0.5, NEGLIGIBLE) for values in scaled]
     every = np.hstack([over_part[-1], *over])
     roots = [*over_part, *over, every]

@@ -13,16 +13,15 @@ from scipy.special import chdtri
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import LearnedCurve
-from paint_deposition.effects.learned.law import LearnedFootprint
+from paint_deposition.effects.learned_curves import LearnedCurve
+from paint_deposition.effects.learned_laws import LearnedFootprint
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, scaled_covariance
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.model.eq1_pattern import Brush, SetPoints, listed
+from paint_deposition.model.eq1_pattern import Brush, listed
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 
@@ -262,16 +261,13 @@ def with_brushes_of(campaign: Campaign, model: DepositionModel) -> DepositionMod
             f"experiment '{silent}' names no brush, others name {listed(numbers - {ONLY_BRUSH})}: "
             'give it `brush: NUMBER` in the campaign'
         )
-    return DepositionModel.of_brushes(
-        (
-            Brush(number=n, planar=model.planar, **_set_points(campaign, n).model_dump())
-            for n in numbers
-        ),
-        projection=model.projection, effects=model.effects,
-    )  # fmt: skip
+    brushes = tuple(
+        Brush(number=n, planar=model.planar, **_set_points(campaign, n)) for n in numbers
+    )
+    return DepositionModel(brushes=brushes, projection=model.projection, effects=model.effects)
 
 
-def _set_points(campaign: Campaign, number: int) -> SetPoints:
+def _set_points(campaign: Campaign, number: int) -> dict[str, float]:
     """Medians over the recordings with this brush alone."""
     found = {}
     # What recordings hold of the process beside the flow, which is relative to the brush's.
@@ -283,4 +279,4 @@ def _set_points(campaign: Campaign, number: int) -> SetPoints:
         ]
         if recorded:
             found[name] = float(np.median(recorded))
-    return SetPoints(**found)
+    return found

@@ -21,7 +21,7 @@ from paint_deposition.inference.fitting.random_effects import (
     random_effects,
 )
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.covariates import Covariate, Rays
+from paint_deposition.inference.readings.covariates import Rays
 from paint_deposition.inference.readings.gauge_noise import GaugeNoise, gauge_noise
 from paint_deposition.inference.readings.plausibility import check_unit
 from paint_deposition.inference.readings.readings import Residuals, root_mean_square
@@ -33,12 +33,9 @@ FOLDS = 6
 TEXTURE_SHARE = 0.01
 
 
-@dataclass(frozen=True)
-class Mistake:
-    """Data that are simply wrong, see ``mistaken_data``."""
-
-    sentence: str  # with the remedy
-    stops: bool  # whether nothing can be concluded from the data
+# Data that are simply wrong, see ``mistaken_data``: a sentence with the remedy, and whether
+# nothing can be concluded from them.
+Mistake = tuple[str, bool]
 
 
 @dataclass(frozen=True)
@@ -177,7 +174,7 @@ class Study:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What is simply wrong with the data, a line each."""
-        return tuple(mistake.sentence for mistake in self.mistakes)
+        return tuple(sentence for sentence, _ in self.mistakes)
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -204,7 +201,7 @@ class Study:
 
     @property
     def noise_floor_um(self) -> float:
-        """Root mean square of the points' standard deviations [um]."""
+        """Root mean square of the points' standard deviations: gauge, texture, facets [um]."""
         return root_mean_square(self.sigma_um)
 
     @cached_property
@@ -307,24 +304,18 @@ class Study:
             self._rays[key] = [Rays.of(e, model) for e in self.campaign.experiments]
         return self._rays[key]
 
-    def covariates(self, model: DepositionModel) -> list[Covariate]:
-        """Covariates of all points."""
-        return [
-            Covariate(same[0].name, np.concatenate([part.values for part in same]))
-            for same in zip(*(rays.covariates for rays in self.rays(model)), strict=True)
-        ]
-
-    @property
-    def has_several_parts(self) -> bool:
-        """Whether whole parts can be left out."""
-        return len(self.campaign.experiments) > 1
+    def covariates(self, model: DepositionModel) -> dict[str, np.ndarray]:
+        """(P,) covariates of all points, by name."""
+        parts = [rays.covariates for rays in self.rays(model)]
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def folds(self) -> np.ndarray:
         """(P,) number of the fold in which each point is left out.
 
         Whole parts where there are several, else patches of the one part.
         """
-        return self.campaign.experiment_of % FOLDS if self.has_several_parts else self.patches()
+        several = len(self.campaign.experiments) > 1
+        return self.campaign.experiment_of % FOLDS if several else self.patches()
 
     def patches(self) -> np.ndarray:
         """(P,) number of the patch of its part in which each point lies."""

@@ -6,21 +6,13 @@ from functools import cached_property
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import along_path, at_points
+from paint_deposition.effects.learned_curves import along_path, at_points
 from paint_deposition.inference.readings.campaign import Experiment
 
 
-@dataclass(frozen=True)
-class Covariate:
-    """One quantity at each point."""
-
-    name: str  # with its unit, as in the report
-    values: np.ndarray  # (P,)
-
-    @property
-    def varies(self) -> bool:
-        """Whether it differs between points by more than rounding in the recording."""
-        return bool(np.std(self.values) > 1e-4 * np.max(np.abs(self.values)))
+def varies(values: np.ndarray) -> bool:
+    """Whether a covariate (P,) differs between points by more than rounding in the recording."""
+    return bool(np.std(values) > 1e-4 * np.max(np.abs(values)))
 
 
 @dataclass(frozen=True)
@@ -96,6 +88,6 @@ class Rays:
         }
 
     @cached_property
-    def covariates(self) -> list[Covariate]:
-        """All covariates of the P points, on average over the film that arrived."""
-        return [Covariate(name, self.mean(values)) for name, values in self.along.items()]
+    def covariates(self) -> dict[str, np.ndarray]:
+        """(P,) all covariates of the points by name, on average over the film that arrived."""
+        return {name: self.mean(values) for name, values in self.along.items()}

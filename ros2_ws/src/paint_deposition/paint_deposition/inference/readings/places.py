@@ -7,8 +7,7 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.readings.readings import PointMeans, Readings
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import near_pairs
-from paint_deposition.part.orientation import across_axis, downhill_axis
-from paint_deposition.part.points import box_words
+from paint_deposition.part.points import across_axis, box_words, downhill_axis
 from paint_deposition.part.surface import Surface
 
 # Readings further from the surface do not belong to the part.

@@ -189,11 +189,6 @@ class Residuals:
         return self.predicted_um > DEFAULT_PAINTED_ABOVE_UM
 
     @property
-    def rmse_painted_um(self) -> float:
-        """Root mean square residual where the model predicts paint [um], 0 if nowhere."""
-        return self.select(self.painted).rmse_um
-
-    @property
     def sd_um(self) -> float:
         """Sample standard deviation of the residuals, with N - 1 [um]; 0 for a single one."""
         return float(self.residual_um.std(ddof=1)) if len(self) > 1 else 0.0

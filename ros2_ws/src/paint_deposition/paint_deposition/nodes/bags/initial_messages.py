@@ -18,8 +18,8 @@ from paint_deposition.files.recordings.messages import (
     stamp_ns,
     trigger_change,
 )
-from paint_deposition.motion.part_frame import Rigid, is_pose
 from paint_deposition.motion.pose_stream import TriggerChange
+from paint_deposition.motion.transforms import Rigid, is_pose
 from paint_deposition.nodes.bags.recorded_topic import PARAMETER_EVENTS, STATIC_TF
 from paint_deposition.nodes.runtime.topics import header_stamp_ns
 

@@ -15,10 +15,10 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns, trigger_change
-from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trajectory import SPRAYS_NOTHING
+from paint_deposition.motion.transforms import NoTransform
 from paint_deposition.nodes.painting.frames import TfQueue, placed_in_order
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic

@@ -148,7 +148,7 @@ class DepositionSimulator(PaintingNode):
                     'model_file': file,
                     'painted_volume_cm3': laid_cm3[name],
                     'share': share,
-                    'emitted_volume_cm3': gun.emitted_cm3,
+                    'emitted_volume_cm3': gun.used.emitted_cm3,
                     'poses': poses,
                 }
                 for (name, share), file, gun, poses in zip(
@@ -156,7 +156,7 @@ class DepositionSimulator(PaintingNode):
                 )
             ]
             film_um = film.film_um
-            figures = statistics_of(values, surface, film_um, film.emitted_cm3, zones)
+            figures = statistics_of(values, surface, film_um, film.used.emitted_cm3, zones)
             if any(gun.model.brushes for gun in film.guns):
                 details['paint'] = film.used.figures(figures.mean_um, figures.painted_volume_cm3)
             return write_film(

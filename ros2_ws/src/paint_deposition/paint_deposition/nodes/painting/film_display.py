@@ -24,7 +24,7 @@ from paint_deposition.film.statistics import FIGURES, FilmStatistics, film_stati
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.topics import ColouredMesh, gun_topic, header, white_marker
-from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.points import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.report.colour_scales import TABLE, ColourScale, film_scale
@@ -182,7 +182,9 @@ class FilmDisplay:
         node, values = self._node, self._node.values
         self._version += 1
         self._film_um = film.film_um
-        figures = statistics_of(values, node.surface, self._film_um, film.emitted_cm3, node.zones)
+        figures = statistics_of(
+            values, node.surface, self._film_um, film.used.emitted_cm3, node.zones
+        )
         laid_cm3 = volume_by_gun(node.gun_names, node.surface, film)
         self._stats = ThicknessStats(
             header=at,

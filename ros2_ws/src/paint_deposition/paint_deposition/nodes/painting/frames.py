@@ -11,8 +11,14 @@ from geometry_msgs.msg import PoseStamped, TransformStamped
 from rclpy.publisher import Publisher
 
 from paint_deposition.files.recordings.messages import pose_of, stamp_ns, transforms_of
-from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
-from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
+from paint_deposition.motion.transforms import (
+    LONGEST_GAP_NS,
+    PART_POSE_TOPIC,
+    FrameTree,
+    NoTransform,
+    Rigid,
+    is_frame,
+)
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, header

@@ -118,9 +118,10 @@ class PartChange:
             late = f'the first poses of {part.run} waited {self._gap_s:.2f} s for its mesh'
             return Status(WARN, f'{late}: prepare it before the part comes', values)
         # Less paint may fly past before the part.
-        if film.emitted_cm3 >= 5.0 and film.raw_um.max() <= NO_PAINT_UM:
+        emitted_cm3 = film.used.emitted_cm3
+        if emitted_cm3 >= 5.0 and film.raw_um.max() <= NO_PAINT_UM:
             beside = (
-                f'{film.emitted_cm3:.0f} cm3 were sprayed and nothing lands on the part: check '
+                f'{emitted_cm3:.0f} cm3 were sprayed and nothing lands on the part: check '
                 'part_pose, mesh_scale and the TCP, whose z axis points at the surface'
             )
             return Status(WARN, beside, values)

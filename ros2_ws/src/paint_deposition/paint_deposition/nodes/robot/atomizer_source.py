@@ -17,8 +17,8 @@ from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, Robot
 from paint_deposition.files.recordings.messages import Signal, stamp_ns
 from paint_deposition.model.eq1_pattern import MOST
-from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.motion.trajectory import ONLY_BRUSH
+from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.nodes.robot.robot_poses import QUEUE_DEPTH, SILENT_S, JointPoses, TfPoses
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed, requested

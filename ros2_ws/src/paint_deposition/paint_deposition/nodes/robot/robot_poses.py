@@ -12,8 +12,7 @@ from sensor_msgs.msg import JointState
 from paint_deposition.errors import PaintError, RecordingError, did_you_mean
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.messages import stamp_ns, transforms_of
-from paint_deposition.motion.frame_tree import FrameTree, NoTransform
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.transforms import FrameTree, NoTransform, Rigid
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
 

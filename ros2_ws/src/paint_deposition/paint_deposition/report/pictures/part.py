@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import coarse_faces, edges_of
-from paint_deposition.part.orientation import downhill_axis
+from paint_deposition.part.points import downhill_axis
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones

@@ -10,8 +10,8 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import LearnedCurve
-from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
+from paint_deposition.effects.learned_curves import LearnedCurve
+from paint_deposition.effects.learned_laws import LEAST_FACTOR, LearnedLaw
 from paint_deposition.files.atomic import filled, write_json, write_text
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.model_file import ModelFile, write_model
@@ -27,9 +27,9 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.estimates import Estimate, estimates
 from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.report.data import ReportData, history_as_list
 from paint_deposition.report.page import report_html
 from paint_deposition.report.pictures.readings import (

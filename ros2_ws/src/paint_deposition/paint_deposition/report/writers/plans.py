@@ -28,10 +28,10 @@ from paint_deposition.files.recordings.bag_files import TRIGGER
 from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
 from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.inference.design.reading_choice import ChosenReadings
-from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
-from paint_deposition.part.orientation import across_axis
+from paint_deposition.motion.transforms import Rigid, moved
+from paint_deposition.part.points import across_axis
 from paint_deposition.planning.faces import PartPlan
 from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.part_places import PartPlaces

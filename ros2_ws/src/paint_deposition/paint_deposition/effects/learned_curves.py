@@ -9,8 +9,8 @@ from numba.extending import register_jitable
 from pydantic import Field, model_validator
 
 from paint_deposition.effects.base import PathContext
-from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw, applied, places_m
-from paint_deposition.kernel.laws import Ray
+from paint_deposition.effects.learned_laws import LEAST_FACTOR, LearnedLaw, applied, places_m
+from paint_deposition.kernel.eq2_flux import Ray
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 
@@ -81,37 +81,22 @@ class LearnedCurve(LearnedLaw):
         """What the film is multiplied by at values of the covariate."""
         return np.maximum(1.0 + self.curve(value), LEAST_FACTOR)
 
-
-class _PathCurve(LearnedCurve):
-    """Acts on the flow, by a covariate of each sub-step."""
-
-    def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
-        return path.with_flow_scaled(self.factor(along_path(path)[self.covariate]))
-
-
-class _SurfaceCurve(LearnedCurve):
-    """Acts on the film, by a covariate of each point; bare metal stays bare."""
-
-    kinds = ('factor', 'addition')
-
-    def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
-        return applied(film_um, self.curve(at_points(points)[self.covariate]()), self.kind)
-
-
-class _FilmCurve(LearnedCurve):
-    """Acts on the film, or what the gauge makes of it, by the film itself."""
-
-    def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
-        return applied(film_um, self.curve(film_um), self.kind)
-
-
-class _RayCurve(LearnedCurve):
-    """Acts on the flux of each ray, inside the kernel."""
-
     def values(self) -> tuple[float, ...]:
-        """The first knot, knots per unit of the axis, and the curve at the knots."""
+        """For the kernel: first knot, knots per unit of the axis, and the curve at the knots."""
         first, last = self.axis(self.low), self.axis(self.high)
         return (float(first), (len(self.learned) - 1) / float(last - first), *self.learned)
+
+
+def _on_path(law: LearnedCurve, path: SprayPath, context: PathContext) -> SprayPath:
+    """Acts on the flow, by a covariate of each sub-step."""
+    return path.with_flow_scaled(law.factor(along_path(path)[law.covariate]))
+
+
+def _on_film(law: LearnedCurve, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
+    """Acts on the film, by a covariate of each point, or by the film itself."""
+    is_film = law.covariate == 'film_um'
+    value = film_um if is_film else at_points(points)[law.covariate]()
+    return applied(film_um, law.curve(value), law.kind)
 
 
 def knot_positions(
@@ -177,57 +162,58 @@ def _ray_factor(variable: Callable[[Ray], float]) -> Callable[..., float]:
     return flux_factor
 
 
-def _curve_class(
-    acts: type[LearnedCurve], covariate: str, unit: str, over: str, **others: Any
-) -> type[LearnedCurve]:
-    """The class of the law over a covariate, derived from one of the above."""
+def _curve_class(covariate: str, unit: str, over: str, **acts: Any) -> type[LearnedCurve]:
+    """The class of the law over a covariate, with what says where it acts."""
     what = {
         'id': f'learned:{covariate}', 'covariate': covariate, 'unit': unit, 'over': over,
         '__module__': __name__, '__doc__': f'What is painted follows {over}, as learned.',
     }  # fmt: skip
-    law = new_class(f'Learned_{covariate}', (acts,), {}, lambda names: names.update(what | others))
+    name = f'Learned_{covariate}'
+    law = new_class(name, (LearnedCurve,), {}, lambda names: names.update(what | acts))
     return cast(type[LearnedCurve], law)
 
 
+ALONG_PATH = {'on_path': _on_path}
+OVER_SURFACE = {'on_film': _on_film, 'kinds': ('factor', 'addition')}
 # Learned curves by covariate.
 CURVES: dict[str, type[LearnedCurve]] = {
     law.covariate: law
     for law in (
         _curve_class(
-            _RayCurve, 'incidence_deg', 'deg', 'the angle of incidence',
+            'incidence_deg', 'deg', 'the angle of incidence',
             # Minus the angle's cosine, which the kernel knows.
             axis=staticmethod(lambda value: -np.cos(np.radians(value))),
             flux_factor=staticmethod(_ray_factor(lambda ray: -ray.cos_incidence)),
         ),
         _curve_class(
-            _RayCurve, 'standoff_ratio', '1', 'the distance as a multiple of Omega',
+            'standoff_ratio', '1', 'the distance as a multiple of Omega',
             flux_factor=staticmethod(_ray_factor(lambda ray: ray.standoff_ratio)),
         ),
-        _curve_class(_PathCurve, 'time_s', 's', 'the time since the motion began'),
-        _curve_class(_PathCurve, 'spray_pass', '1', 'the number of the pass'),
+        _curve_class('time_s', 's', 'the time since the motion began', **ALONG_PATH),
+        _curve_class('spray_pass', '1', 'the number of the pass', **ALONG_PATH),
         _curve_class(
-            _PathCurve, 'stroke_end_m', 'm', 'the distance to the nearer end of the stroke',
-            needs_whole_strokes=True,
+            'stroke_end_m', 'm', 'the distance to the nearer end of the stroke',
+            needs_whole_strokes=True, **ALONG_PATH,
         ),
-        _curve_class(_PathCurve, 'since_trigger_s', 's', 'the time since the trigger opened'),
-        _curve_class(_PathCurve, 'speed_m_per_s', 'm/s', 'the speed of the gun'),
-        _curve_class(_SurfaceCurve, 'curvature_per_m', '1/m', 'the curvature of the surface'),
+        _curve_class('since_trigger_s', 's', 'the time since the trigger opened', **ALONG_PATH),
+        _curve_class('speed_m_per_s', 'm/s', 'the speed of the gun', **ALONG_PATH),
+        _curve_class('curvature_per_m', '1/m', 'the curvature of the surface', **OVER_SURFACE),
         _curve_class(
-            _SurfaceCurve, 'edge_distance_m', 'm', 'the distance to the nearest free edge',
+            'edge_distance_m', 'm', 'the distance to the nearest free edge',
             # A scale that resolves what is close to the edge.
             axis=staticmethod(
                 lambda value: np.log1p(np.minimum(value, FARTHEST_EDGE_M) / EDGE_SCALE_M)
             ),
+            **OVER_SURFACE,
         ),
         _curve_class(
-            _SurfaceCurve, 'sky_view_factor', '1',
-            'the share of the half-space that a point sees',
+            'sky_view_factor', '1', 'the share of the half-space that a point sees', **OVER_SURFACE
         ),
         _curve_class(
-            _SurfaceCurve, 'across_m', 'm', "the distance from the part's centre to the right"
+            'across_m', 'm', "the distance from the part's centre to the right", **OVER_SURFACE
         ),
-        _curve_class(_SurfaceCurve, 'height_fraction', '1', 'the height on the part'),
-        _curve_class(_FilmCurve, 'film_um', 'um', 'the film itself'),
+        _curve_class('height_fraction', '1', 'the height on the part', **OVER_SURFACE),
+        _curve_class('film_um', 'um', 'the film itself', on_film=_on_film),
     )
 }  # fmt: skip
 # Where pickle looks for them.

@@ -5,8 +5,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
-from paint_deposition.motion.part_frame import Rigid, is_frame, is_pose
+from paint_deposition.motion.transforms import (
+    LONGEST_GAP_NS,
+    FrameTree,
+    NoTransform,
+    Rigid,
+    is_frame,
+    is_pose,
+)
 from paint_deposition.planning.part_places import locate
 
 

@@ -7,15 +7,15 @@ of an embedded discrepancy, inferred inside the model and shown against a physic
 """
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.kernel.laws import Ray
-from paint_deposition.part.orientation import across_axis, downhill_axis
-from paint_deposition.part.points import SurfacePoints
+from paint_deposition.kernel.eq2_flux import Ray
+from paint_deposition.part.points import SurfacePoints, across_axis, downhill_axis
 
 # A factor never takes more than all but this share of the film away.
 LEAST_FACTOR = 0.05
@@ -51,6 +51,7 @@ class LearnedLaw(Effect):
         return self
 
     @classmethod
+    @cache
     def parameters(cls) -> dict[str, dict[str, Any]]:
         """None: a fit does not vary the law; it is learned by its own step."""
         return {}
