@@ -256,7 +256,7 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
     """Write the law learned last as an effect, and say how to use it."""
     from paint_deposition.effects.learned.curves import LearnedCurve
     from paint_deposition.inference.diagnosis.closed_forms import forms_of
-    from paint_deposition.report.writers.inference import effect_entry, write_effect_file
+    from paint_deposition.report.write_inference import effect_entry, write_effect_file
 
     law, forms = diagnosis.model.effects[-1], forms_of(diagnosis.model.effects[-1])
     if not forms or not isinstance(law, LearnedCurve):

@@ -297,7 +297,7 @@ def _gun_on_part(
         model = model_for(model_file, path).model
         seen = pd.look_at(part.surface(), recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:
-            from paint_deposition.report.pictures.planning import write_geometry_picture
+            from paint_deposition.report.plan_pictures import write_geometry_picture
 
             show('drawing')
             title = f'{path.name} over {Path(str(part.mesh)).name}'

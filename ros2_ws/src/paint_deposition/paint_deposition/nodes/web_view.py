@@ -21,11 +21,11 @@ from paint_deposition.files.recordings.messages import stamp_ns, transforms_of, 
 from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
-from paint_deposition.nodes.painting.frames import PartFrame, TfQueue, placed_in_order
+from paint_deposition.nodes import topics
+from paint_deposition.nodes.frames import PartFrame, TfQueue, placed_in_order
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.painting.painting_parameters import read_part
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import (
+from paint_deposition.nodes.parameters import (
     NodeParameter,
     atomizers_parameter,
     direction_parameter,
@@ -34,7 +34,7 @@ from paint_deposition.nodes.runtime.parameters import (
     mesh_parameters,
     require_display,
 )
-from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
+from paint_deposition.nodes.topics import AdaptiveSubscription, gun_topic
 from paint_deposition.part.surface import turned
 from paint_deposition.report.colour_scales import film_scale
 from paint_deposition.report.live_page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page, Scene

@@ -41,7 +41,7 @@ from paint_deposition.planning.planned_film import (
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 from paint_deposition.planning.retiming import retime_for_evenness
-from paint_deposition.planning.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
+from paint_deposition.planning.sides import WIDEST_RAD, Face, sprayable_faces
 
 # Of one face, in running order.
 Passes = tuple[PlannedPass, ...]

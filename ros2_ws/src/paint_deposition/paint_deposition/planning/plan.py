@@ -12,7 +12,6 @@ from paint_deposition.errors import PlanError
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.planning.driving import RobotCell
-from paint_deposition.planning.index_search import passes_to_cover
 from paint_deposition.planning.passes import (
     WAYPOINT_STEP_M,
     WAYPOINTS_PER_MOVE,
@@ -25,6 +24,7 @@ from paint_deposition.planning.placement import (
     LineFilms,
     Placement,
     best_placement,
+    passes_to_cover,
     place_passes,
     placement_at,
 )
@@ -40,7 +40,7 @@ from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 from paint_deposition.planning.retiming import retime_for_evenness
-from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
+from paint_deposition.planning.sides import SurfaceMap, pass_axes
 
 Planned = TypeVar('Planned', bound=PlannedFilm)
 

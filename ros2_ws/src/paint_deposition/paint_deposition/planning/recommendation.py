@@ -10,7 +10,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq3_collapse import half_width_m
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
-from paint_deposition.planning.index_search import (
+from paint_deposition.planning.placement import (
     SEARCHED,
     IndexCurve,
     Minimum,

@@ -41,11 +41,11 @@ from paint_deposition.files.recordings.pose_topics import (
     read_frames,
 )
 from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
+from paint_deposition.nodes import topics
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed, requested
-from paint_deposition.nodes.runtime.topics import (
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
+from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
+from paint_deposition.nodes.topics import (
     header,
     header_stamp_ns,
     pose_message,

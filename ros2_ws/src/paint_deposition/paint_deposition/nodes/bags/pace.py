@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.nodes.runtime.topics import PROGRESS, PROGRESS_TOPIC, node_name
+from paint_deposition.nodes.topics import PROGRESS, PROGRESS_TOPIC, node_name
 
 LOG_PERIOD_S = 5.0
 ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)

@@ -9,6 +9,7 @@ from typing import Any
 from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 
+from paint_deposition.nodes.node import Task
 from paint_deposition.nodes.painting.film_display import (
     FilmDisplay,
     shares,
@@ -19,8 +20,7 @@ from paint_deposition.nodes.painting.health import FilmTrust, painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
-from paint_deposition.nodes.runtime.node import Task
-from paint_deposition.nodes.runtime.parameters import (
+from paint_deposition.nodes.parameters import (
     CONFIGURED,
     NodeParameter,
     display_parameters,
@@ -28,7 +28,7 @@ from paint_deposition.nodes.runtime.parameters import (
     require_display,
     require_file_name,
 )
-from paint_deposition.report.writers.write import write_film
+from paint_deposition.report.write import write_film
 
 
 class DepositionSimulator(PaintingNode):

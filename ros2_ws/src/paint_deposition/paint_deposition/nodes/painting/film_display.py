@@ -21,9 +21,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FIGURES, FilmStatistics, film_statistics
+from paint_deposition.nodes import topics
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.topics import ColouredMesh, gun_topic, header, white_marker
+from paint_deposition.nodes.topics import ColouredMesh, gun_topic, header, white_marker
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones

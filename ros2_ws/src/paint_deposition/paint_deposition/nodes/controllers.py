@@ -21,10 +21,10 @@ from paint_msgs.msg import AtomizerState
 
 from paint_deposition.errors import PaintError, quoted
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
-from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
-from paint_deposition.nodes.runtime.topics import header
+from paint_deposition.nodes.atomizer_source import LATCHED_STATES
+from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status
+from paint_deposition.nodes.parameters import NodeParameter, fixed
+from paint_deposition.nodes.topics import header
 
 TIMEOUT_S = 5.0
 POLL_S = 0.2

@@ -15,9 +15,7 @@ from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics, wanted_a
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.report.colour_scales import BARE_RGB, ColourScale, film_scale
-from paint_deposition.report.pictures.part import HALO, PartPicture, View
-from paint_deposition.report.style import (
+from paint_deposition.report.colour_scales import (
     BARE,
     BELOW,
     GRID,
@@ -25,6 +23,13 @@ from paint_deposition.report.style import (
     INK,
     MUTED,
     WITHIN,
+    ColourScale,
+    film_scale,
+)
+from paint_deposition.report.drawing import (
+    HALO,
+    PartPicture,
+    View,
     colour_bar,
     colours_of,
     new_figure,
@@ -63,8 +68,7 @@ def film_picture(
     s, figures = statistics, figure.add_subplot(grid[rows - 1, 1])
     figures.set_axis_off()
     if np.any(film_um <= s.painted_above_um):
-        colour = '#{:02x}{:02x}{:02x}'.format(*BARE_RGB)
-        _draw_patches(figures, [(colour, f'up to {s.painted_above_um:g} µm')])
+        _draw_patches(figures, [(BARE, f'up to {s.painted_above_um:g} µm')])
     _write(
         figures,
         f'mean {s.mean_um:.1f} µm, standard deviation {s.std_dev_um:.1f} µm\n'

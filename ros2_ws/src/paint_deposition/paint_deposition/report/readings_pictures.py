@@ -15,26 +15,32 @@ from paint_deposition.inference.comparison.regions import interpolate_over_surfa
 from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.panel import PanelFit
-from paint_deposition.report.colour_scales import film_scale, residual_scale
-from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.film import page_film
-from paint_deposition.report.pictures.part import HALO, PALE_HALO, PartPicture, label_points
-from paint_deposition.report.style import (
+from paint_deposition.report.colour_scales import (
     ACCENT,
     BEFORE,
     COMPONENTS,
     INK,
-    MM,
     MUTED,
-    PAGE_IN,
-    TEXT_PT,
     TWO_SIDED_95,
+    film_scale,
+    residual_scale,
+)
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.drawing import (
+    HALO,
+    MM,
+    PAGE_IN,
+    PALE_HALO,
+    TEXT_PT,
+    PartPicture,
     colour_bar,
+    label_points,
     legend,
     new_figure,
     quiet,
     save_picture,
 )
+from paint_deposition.report.film_pictures import page_film
 
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
 # A profile's two charts with the room around them [in].
