@@ -195,8 +195,11 @@ def sprayable_faces(surface: Surface, widest_rad: float = WIDEST_RAD) -> tuple[F
     """
     normals = face_normals(surface.vertices_m, surface.faces)
     areas = face_areas_m2(surface.vertices_m, surface.faces)
+    # (V,) number of the place of each vertex: along creases several vertices share one.
+    rounded = np.round(surface.vertices_m / 1e-6).astype(np.int64)
+    place = np.unique(rounded, axis=0, return_inverse=True)[1].ravel()
     # (N, 2) triangles that share an edge.
-    half_edges, first = half_edges_by_edge(_places(surface)[surface.faces])
+    half_edges, first = half_edges_by_edge(place[surface.faces])
     follows = np.ones(len(half_edges), dtype=bool)
     follows[first[:-1]] = False
     same = np.flatnonzero(follows)
@@ -207,7 +210,14 @@ def sprayable_faces(surface: Surface, widest_rad: float = WIDEST_RAD) -> tuple[F
     label = _without_small(label, pairs, normals, areas)
     names = np.unique(label)
     order = np.argsort([-areas[label == name].sum() for name in names])
-    return tuple(_face(surface, label == names[k]) for k in order)
+    edge, found = edges_of(place[surface.faces])[1], []
+    for name in names[order]:
+        kept = label == name
+        seam = np.flatnonzero((kept[:, None] & np.isin(edge, edge[~kept])).ravel())
+        ends_m = half_edges_m(surface.vertices_m, surface.faces, seam)
+        own, rows = patch(surface, kept)
+        found.append(Face(own, rows, edge_distance_m(own.vertices_m, ends_m)))
+    return tuple(found)
 
 
 def patch(surface: Surface, kept: np.ndarray) -> tuple[Surface, np.ndarray]:
@@ -226,20 +236,6 @@ def patch(surface: Surface, kept: np.ndarray) -> tuple[Surface, np.ndarray]:
         neighbours=None,
     )
     return found, rows
-
-
-def _face(surface: Surface, kept: np.ndarray) -> Face:
-    found, rows = patch(surface, kept)
-    edge = edges_of(_places(surface)[surface.faces])[1]
-    seam = np.flatnonzero((kept[:, None] & np.isin(edge, edge[~kept])).ravel())
-    ends_m = half_edges_m(surface.vertices_m, surface.faces, seam)
-    return Face(found, rows, edge_distance_m(found.vertices_m, ends_m))
-
-
-def _places(surface: Surface) -> np.ndarray:
-    """(V,) number of the place of each vertex: along creases several vertices share one."""
-    rounded = np.round(surface.vertices_m / 1e-6).astype(np.int64)
-    return np.unique(rounded, axis=0, return_inverse=True)[1].ravel()
 
 
 def _sides(normals: np.ndarray, areas: np.ndarray, widest_rad: float) -> np.ndarray:

@@ -210,11 +210,7 @@ def _write(axes: Axes, text: str, size: float = 9.5) -> None:
 
 
 def _draw_histogram(
-    axes: Axes,
-    surface: Surface,
-    film_um: np.ndarray,
-    s: FilmStatistics,
-    zones: PointZones | None,
+    axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmStatistics, zones: PointZones | None
 ) -> None:
     """Area over film, of zones in tolerances from their targets, with the band behind it."""
     painted, shown = film_um > s.painted_above_um, film_um

@@ -33,10 +33,7 @@ from paint_deposition.inference.posterior import Posterior
 from paint_deposition.report.data import ReportData, history_as_list
 from paint_deposition.report.drawing import save_picture
 from paint_deposition.report.page import report_html
-from paint_deposition.report.readings_pictures import (
-    comparison_figure,
-    write_calibration_pictures,
-)
+from paint_deposition.report.readings_pictures import comparison_figure, write_calibration_pictures
 from paint_deposition.report.write import written
 
 # What a law is over, in the words of an effect's code, and the family of such effects.

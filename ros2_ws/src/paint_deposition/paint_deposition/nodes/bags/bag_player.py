@@ -45,12 +45,7 @@ from paint_deposition.nodes import topics
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
 from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
-from paint_deposition.nodes.topics import (
-    header,
-    header_stamp_ns,
-    pose_message,
-    unknown_state,
-)
+from paint_deposition.nodes.topics import header, header_stamp_ns, pose_message, unknown_state
 from paint_deposition.request import MotionOptions
 
 
