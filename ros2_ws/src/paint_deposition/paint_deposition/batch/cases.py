@@ -253,7 +253,7 @@ def _serialised(value: Any) -> bytes:
     return content.getvalue()
 
 
-def _class_reduced(model: type) -> Any:
+def _class_reduced(model: Any) -> Any:
     """How to make the class of a user's effect elsewhere; the name of any other."""
     file = getattr(model, 'file', None)
     return (effect_of, (file, model.file_content)) if file else model.__qualname__

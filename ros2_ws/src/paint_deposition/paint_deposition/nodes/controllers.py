@@ -7,7 +7,7 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import timezone
 from types import SimpleNamespace
@@ -62,6 +62,8 @@ class SignalSource(PaintNode):
 
     PASSWORD: str  # the variable of the environment
     LIBRARY: str
+    # Connects and takes the signals until ``stopped``; errors are told, then retried.
+    follow: Callable[[], None]
 
     def __init__(self, **kwargs: Any):
         super().__init__(**kwargs)
@@ -99,10 +101,6 @@ class SignalSource(PaintNode):
             raise PaintError(
                 f'{self.get_name()}: {library} is not installed; run: pip install {library}'
             ) from None
-
-    def follow(self) -> None:
-        """Connect and ``take`` the signals until ``stopped``; errors are told, then retried."""
-        raise NotImplementedError
 
     def _keep_following(self) -> None:
         while not self.stopped.is_set():

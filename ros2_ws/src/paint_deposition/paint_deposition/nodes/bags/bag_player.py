@@ -229,9 +229,7 @@ class BagPlayer(PaintNode):
                     self._subscribers_to_await = 0  # when looping
                     self._time.change(started=True)
                 # Wait for the end of a pause, the time of the message, and the flow control.
-                while not self.stopped.is_set():
-                    if self._time.wait_for(message.log_time_ns, timeout_s=0.05):
-                        break
+                self._time.wait_for(message.log_time_ns, self.stopped)
                 if self.values['rate'] == 0.0:
                     self._flow_control.wait_for_room()
                     self._time.change(time_ns=message.log_time_ns)

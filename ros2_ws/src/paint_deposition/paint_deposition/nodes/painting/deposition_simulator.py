@@ -12,9 +12,8 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from paint_deposition.nodes.node import Task
 from paint_deposition.nodes.painting.film_display import (
     FilmDisplay,
-    shares,
+    laid_by_gun,
     statistics_of,
-    volume_by_gun,
 )
 from paint_deposition.nodes.painting.health import FilmTrust, painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
@@ -141,20 +140,15 @@ class DepositionSimulator(PaintingNode):
             details['part'] = part
 
         def write() -> list[Path]:
-            laid_cm3 = volume_by_gun(names, surface, film)
             details['atomizers'] = [
                 {
-                    'name': name,
-                    'model_file': file,
-                    'painted_volume_cm3': laid_cm3[name],
-                    'share': share,
-                    'emitted_volume_cm3': gun.emitted_cm3,
-                    'poses': poses,
+                    'name': name, 'model_file': file, 'painted_volume_cm3': laid_cm3,
+                    'share': share, 'emitted_volume_cm3': gun.emitted_cm3, 'poses': poses,
                 }
-                for (name, share), file, gun, poses in zip(
-                    shares(laid_cm3).items(), files, film.guns, counts, strict=True
+                for name, file, laid_cm3, share, gun, poses in zip(
+                    names, files, *laid_by_gun(surface, film), film.guns, counts, strict=True
                 )
-            ]
+            ]  # fmt: skip
             film_um = film.film_um
             figures = statistics_of(values, surface, film_um, film.emitted_cm3, zones)
             if any(gun.model.brushes for gun in film.guns):

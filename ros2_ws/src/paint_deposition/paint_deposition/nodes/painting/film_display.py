@@ -3,7 +3,7 @@
 import sys
 import time
 from array import array
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -45,15 +45,11 @@ def statistics_of(
     return film_statistics(film_um, surface.vertex_areas_m2, emitted_cm3, zones=zones, **chosen)
 
 
-def volume_by_gun(guns: Sequence[str], surface: Surface, film: CommonFilm) -> dict[str, float]:
-    """Solids that each gun laid on the part, by its name [cm3]."""
-    return dict(zip(guns, film.laid_cm3(surface.vertex_areas_m2).tolist(), strict=True))
-
-
-def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
-    """Each gun's share of the paint on the part, 0 to 1; 0 for all without paint."""
-    total = sum(laid_cm3.values())
-    return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
+def laid_by_gun(surface: Surface, film: CommonFilm) -> tuple[list[float], list[float]]:
+    """Solids that each gun laid on the part [cm3], and its share, 0 to 1; 0 without any paint."""
+    laid_cm3 = film.laid_cm3(surface.vertex_areas_m2).tolist()
+    total = sum(laid_cm3)
+    return laid_cm3, [laid / total if total else 0.0 for laid in laid_cm3]
 
 
 def cloud_message(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
@@ -183,13 +179,13 @@ class FilmDisplay:
         self._version += 1
         self._film_um = film.film_um
         figures = statistics_of(values, node.surface, self._film_um, film.emitted_cm3, node.zones)
-        laid_cm3 = volume_by_gun(node.gun_names, node.surface, film)
+        laid_cm3, shares = laid_by_gun(node.surface, film)
         self._stats = ThicknessStats(
             header=at,
             run=run,
-            atomizers=list(laid_cm3),
-            atomizer_volume_cm3=list(laid_cm3.values()),
-            atomizer_share=list(shares(laid_cm3).values()),
+            atomizers=node.gun_names,
+            atomizer_volume_cm3=laid_cm3,
+            atomizer_share=shares,
             **{name: getattr(figures, name) for name in FIGURES},
         )
         self._counts = None
