@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, TriMesh
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.patheffects import Normal, Stroke
@@ -118,23 +119,13 @@ class PartPicture:
         edges = edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
         return PartPicture(view, flat, faces, seen, flat[edges])
 
-    @property
-    def low_m(self) -> np.ndarray:
-        """(2,) lowest corner of the part in the picture [m]."""
-        return self.flat_m.min(axis=0)
-
-    @property
-    def high_m(self) -> np.ndarray:
-        """(2,) highest corner of the part in the picture [m]."""
-        return self.flat_m.max(axis=0)
-
-    def window(self, spray: SprayPath) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest corner of a picture of the part with its whole passes [m]."""
-        low, high = self.low_m, self.high_m
+    def window(self, spray: SprayPath | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest corner of a picture of the part, with its whole passes if any [m]."""
+        low, high = self.flat_m.min(axis=0), self.flat_m.max(axis=0)
         # Passes beside the part are shown as far off as the part is large.
         margin = (high - low).max()
-        gun = self.view.flat(spray.position_m[spray.flow > 0.0])
-        if len(gun):
+        if spray is not None and (spray.flow > 0.0).any():
+            gun = self.view.flat(spray.position_m[spray.flow > 0.0])
             low = np.maximum(np.minimum(low, gun.min(axis=0)), low - margin)
             high = np.minimum(np.maximum(high, gun.max(axis=0)), high + margin)
         room = 0.03 * (high - low).max()
@@ -315,19 +306,17 @@ def legend(axes: Axes, **options: Any) -> None:
     axes.legend(frameon=False, fontsize=9, labelcolor=INK, **options)
 
 
-def colour_bar(figure: FigureBase, axes: Sequence[Axes], label: str, scale: ColourScale) -> None:
-    """A level bar of the colours below all these axes."""
-    bar = figure.colorbar(
-        colours_of(scale), ax=list(axes), location='bottom', shrink=0.6, aspect=30, pad=0.04
-    )
+def colour_bar(
+    figure: FigureBase, axes: Sequence[Axes], label: str, scale: ColourScale, **place: Any
+) -> Colorbar:
+    """A bar of the colours beside all these axes; level and below them without a ``place``."""
+    palette = ListedColormap(scale.palette[:TABLE] / 255.0)
+    colours = ScalarMappable(Normalize(scale.low, scale.high), palette)
+    place = place or {'location': 'bottom', 'shrink': 0.6, 'aspect': 30, 'pad': 0.04}
+    bar = figure.colorbar(colours, ax=list(axes), **place)
     bar.set_label(label, color=MUTED)
     bar.ax.spines['outline'].set_visible(False)
-
-
-def colours_of(scale: ColourScale) -> ScalarMappable:
-    """What matplotlib makes a bar of colours from."""
-    palette = ListedColormap(scale.palette[:TABLE] / 255.0)
-    return ScalarMappable(Normalize(scale.low, scale.high), palette)
+    return bar
 
 
 def save_picture(figure: Figure, path: str | Path) -> Path:

@@ -31,7 +31,6 @@ from paint_deposition.report.drawing import (
     PartPicture,
     View,
     colour_bar,
-    colours_of,
     new_figure,
     quiet,
 )
@@ -61,10 +60,8 @@ def film_picture(
     grid = figure.add_gridspec(rows, 2, width_ratios=[width, beside])
     axes = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
     scale = draw_film(axes[-1], surface, film_um, spray, statistics.painted_above_um, part)
-    bar = figure.colorbar(colours_of(scale), ax=axes[-1], aspect=25, pad=0.02)
-    bar.set_label('film [µm]', color=MUTED)
+    bar = colour_bar(figure, axes[-1:], 'film [µm]', scale, aspect=25, pad=0.02)
     bar.ax.tick_params(colors=MUTED, labelsize=9)
-    bar.ax.spines['outline'].set_visible(False)
     s, figures = statistics, figure.add_subplot(grid[rows - 1, 1])
     figures.set_axis_off()
     if np.any(film_um <= s.painted_above_um):
