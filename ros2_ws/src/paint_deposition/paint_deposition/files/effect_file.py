@@ -127,7 +127,16 @@ def try_effect(effect: type[Effect], path: str | Path) -> None:
     Raises:
         ModelError: it does not compile, fails or gives no usable result; ``path`` names its file.
     """
-    if problem := problem_in_use(effect):
+    problem = next(filter(None, (_problem_with_law(effect, name) for name in LAWS)), None)
+    if problem is None:
+        typical = effect.typical()
+        with np.errstate(all='ignore'):
+            problem = (
+                _problem_with_figures(typical)
+                or _problem_with_places(typical)
+                or _problem_with_places(typical.absent, changes=False)
+            )
+    if problem:
         raise ModelError(f'{path}: {effect.__name__} {problem}')
 
 
@@ -178,7 +187,21 @@ def problem_in_words(effect: type[Effect]) -> str | None:
             'has a pattern_scale and no widening, beyond which the spray is cut off; define '
             'widening(self): how many times wider than the pattern it can get, at least 1'
         )
-    return _problem_with_trust(effect)
+    # The lines that a diagnosis goes by.
+    for name, known in (('needs', NEEDS), ('free_law', FREE_LAWS)):
+        if getattr(effect, name) not in known:
+            return f'has {name} = {getattr(effect, name)!r}; give one of {", ".join(known[1:])}'
+    if isinstance(effect.covariates, str):
+        return f'has covariates = {effect.covariates!r}; give names, ({effect.covariates!r},)'
+    for name in effect.covariates:
+        if name not in COVARIATES:
+            return f'has the covariate {name!r}, which is none; {did_you_mean(name, COVARIATES)}'
+        if effect.free_law and name in CURVES and effect.free_law not in CURVES[name].kinds:
+            return (
+                f'has free_law = {effect.free_law!r}; over {name} a law is a '
+                f'{" or ".join(CURVES[name].kinds)}'
+            )
+    return None
 
 
 def _problem_with_field(effect: type[Effect], name: str) -> str | None:
@@ -210,38 +233,6 @@ def _problem_with_field(effect: type[Effect], name: str) -> str | None:
     if role == 'amplitude' and typical == neutral:
         return f'is absent at its typical size, {name}={typical:g}; let it differ from neutral'
     return None
-
-
-def _problem_with_trust(effect: type[Effect]) -> str | None:
-    """What is wrong with the lines that a diagnosis goes by."""
-    for name, known in (('needs', NEEDS), ('free_law', FREE_LAWS)):
-        if getattr(effect, name) not in known:
-            return f'has {name} = {getattr(effect, name)!r}; give one of {", ".join(known[1:])}'
-    if isinstance(effect.covariates, str):
-        return f'has covariates = {effect.covariates!r}; give names, ({effect.covariates!r},)'
-    for name in effect.covariates:
-        if name not in COVARIATES:
-            return f'has the covariate {name!r}, which is none; {did_you_mean(name, COVARIATES)}'
-        if effect.free_law and name in CURVES and effect.free_law not in CURVES[name].kinds:
-            return (
-                f'has free_law = {effect.free_law!r}; over {name} a law is a '
-                f'{" or ".join(CURVES[name].kinds)}'
-            )
-    return None
-
-
-def problem_in_use(effect: type[Effect]) -> str | None:
-    """What is wrong with a class once it is compiled and used on a path and points, or None."""
-    for name in LAWS:
-        if problem := _problem_with_law(effect, name):
-            return problem
-    typical = effect.typical()
-    with np.errstate(all='ignore'):
-        return (
-            _problem_with_figures(typical)
-            or _problem_with_places(typical)
-            or _problem_with_places(typical.absent, changes=False)
-        )
 
 
 def one_line(error: BaseException) -> str:

@@ -26,10 +26,10 @@ from paint_deposition.nodes.frames import PartFrame, TfQueue, placed_in_order
 from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.parameters import (
+    DISPLAY,
     NodeParameter,
     atomizers_parameter,
     direction_parameter,
-    display_parameters,
     fixed,
     mesh_parameters,
     require_display,
@@ -47,7 +47,7 @@ class WebView(PaintNode):
     """
 
     NAME = 'web_view'
-    PARAMETERS = display_parameters() | dict(
+    PARAMETERS = dict(DISPLAY) | dict(
         fixed(
             'the page is served with it; restart the node with the new value',
             **mesh_parameters(max_edge_length_m=0.01),

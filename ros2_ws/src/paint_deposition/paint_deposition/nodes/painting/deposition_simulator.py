@@ -21,8 +21,8 @@ from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
 from paint_deposition.nodes.parameters import (
     CONFIGURED,
+    DISPLAY,
     NodeParameter,
-    display_parameters,
     fixed,
     require_display,
     require_file_name,
@@ -49,7 +49,7 @@ class DepositionSimulator(PaintingNode):
             '[Hz]',
             (0.1, 30.0),
         ),
-        **display_parameters(),
+        **DISPLAY,
         **fixed(
             'its zones are found on the mesh once; clean the node up or restart it',
             CONFIGURED,
