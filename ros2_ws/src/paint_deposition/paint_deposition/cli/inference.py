@@ -50,7 +50,7 @@ def _run(
         )  # fmt: skip
         named = model_file or data.model_file
         chosen = chosen_model(Path(named) if named else None, named=bool(model_file))
-        start = chosen.file
+        start = chosen.known if named else None
         known = {name: getattr(start, name, None) for name in begins_with}
         result = verb(data, progress=show, **known)
         show('writing')
