@@ -22,7 +22,8 @@ from PIL import Image
 import paint_deposition as paint
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
-from paint_deposition.report.style import ACCENT, INK, legend, new_figure, quiet, save_picture
+from paint_deposition.report.colour_scales import ACCENT, INK
+from paint_deposition.report.drawing import legend, new_figure, quiet, save_picture
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLES = ROOT / 'ros2_ws/src/paint_deposition/samples'

@@ -7,16 +7,16 @@ from rclpy.action import get_action_server_names_and_types_by_node
 
 from booth import SAMPLES
 from nodes.cell import parameters
+from paint_deposition.nodes.atomizer_source import AtomizerSource
 from paint_deposition.nodes.bags.bag_player import BagPlayer
 from paint_deposition.nodes.bags.recorded_topic import default_topics
 from paint_deposition.nodes.bags.run_recorder import RunRecorder
+from paint_deposition.nodes.controllers import OpcuaSource, RwsSource
+from paint_deposition.nodes.egm_source import EgmSource
 from paint_deposition.nodes.index_planner import IndexPlanner
+from paint_deposition.nodes.managed_node import ManagedNode
 from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
-from paint_deposition.nodes.robot.controllers import OpcuaSource, RwsSource
-from paint_deposition.nodes.robot.egm_source import EgmSource
-from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.web_view import WebView
 from robot_arm import URDF
 

@@ -10,8 +10,7 @@ import booth
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
 from paint_deposition.effects.learned_curves import CURVES
-from paint_deposition.files.effect_file import read_effect_file
-from paint_deposition.files.effect_trial import problem_in_words
+from paint_deposition.files.effect_file import problem_in_words, read_effect_file
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.kernel.eq2_flux import Ray, in_precision
 from reference import reference_film_um

@@ -16,8 +16,7 @@ import paint_deposition as pd
 from booth import SAMPLES, painted, panel, path_of, serpentine
 from paint_deposition.effects.base import Effect, PathContext, SprayPath
 from paint_deposition.errors import ModelError
-from paint_deposition.files.effect_file import load_effect_file
-from paint_deposition.files.effect_trial import NEEDS, PLACES, TRIAL_RAYS
+from paint_deposition.files.effect_file import NEEDS, PLACES, TRIAL_RAYS, load_effect_file
 from paint_deposition.kernel.eq2_flux import Ray, in_precision
 
 SAMPLE = (SAMPLES / 'my_effect.py').read_text()

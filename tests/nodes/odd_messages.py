@@ -6,7 +6,7 @@ import re
 
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from paint_deposition.nodes.runtime.topics import message_class
+from paint_deposition.nodes.topics import message_class
 
 NUMBERS = (0.0, 1.0, -1.0, math.nan, math.inf, -math.inf, 1e308, -1e-308, 1e6, 0.5)
 WORDS = ('', '/', 'part', 'cell', 'no such frame', '..', 'a' * 300, "it's\n=1+1", 'µ\u2028')

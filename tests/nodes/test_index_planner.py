@@ -15,8 +15,8 @@ from rclpy.action import ActionClient
 import paint_deposition as pd
 from nodes.cell import PANEL_M, parameters, write_panel
 from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.nodes import topics
 from paint_deposition.nodes.index_planner import IndexPlanner
-from paint_deposition.nodes.runtime import topics
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest, PlanRequest

@@ -17,9 +17,9 @@ from booth import SAMPLES
 from nodes.cell import Robot, offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.nodes.bags.run_recorder import RunRecorder
+from paint_deposition.nodes.managed_node import ManagedNode
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.runtime.managed_node import ManagedNode
-from paint_deposition.nodes.runtime.topics import LATCHED
+from paint_deposition.nodes.topics import LATCHED
 
 MOTION = two_passes()
 EVENTS = '/deposition_simulator/transition_event'

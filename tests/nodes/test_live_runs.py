@@ -18,8 +18,8 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.topics import TRUST_TOPIC, header
+from paint_deposition.nodes import topics
+from paint_deposition.nodes.topics import TRUST_TOPIC, header
 
 SIMULATOR = 'deposition_simulator'
 PLAYER = 'bag_player'

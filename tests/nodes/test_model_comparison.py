@@ -14,9 +14,9 @@ from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.comparison.regions import radius_of_readings_m
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.nodes import topics
 from paint_deposition.nodes.model_comparison import ModelComparison
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import OK, WARN
+from paint_deposition.nodes.node import OK, WARN
 from paint_deposition.report.colour_scales import BARE_RGB
 
 MOTION = two_passes()

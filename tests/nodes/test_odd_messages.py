@@ -14,11 +14,11 @@ from std_srvs.srv import Trigger
 from nodes.cell import offline_um, two_passes, write_panel
 from nodes.odd_messages import Peer, odd_message
 from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.nodes.atomizer_source import AtomizerSource
 from paint_deposition.nodes.bags.bag_player import BagPlayer
 from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
 from paint_deposition.nodes.web_view import WebView
 from robot_arm import URDF
 

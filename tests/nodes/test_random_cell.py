@@ -48,9 +48,9 @@ from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.transforms import Rigid
+from paint_deposition.nodes.egm_source import EgmSource
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.robot.egm_source import EgmSource
-from paint_deposition.nodes.runtime.topics import header
+from paint_deposition.nodes.topics import header
 from paint_deposition.nodes.web_view import WebView
 
 STEPS = int(os.environ.get('PAINT_STEPS', '30'))

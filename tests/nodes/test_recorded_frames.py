@@ -14,7 +14,7 @@ import paint_deposition as pd
 from nodes.cell import offline_um, parameters, two_passes
 from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.bags.bag_player import BagPlayer
-from paint_deposition.nodes.runtime.topics import header
+from paint_deposition.nodes.topics import header
 
 MOTION = two_passes(poses=200, trigger=False)
 # The part hangs turned by 90 degrees about z, a metre along the cell's x.

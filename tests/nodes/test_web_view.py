@@ -5,7 +5,7 @@ import pytest
 
 from chromium import CHROMIUM, Chromium
 from nodes.cell import two_passes, write_panel
-from paint_deposition.nodes.runtime.node import WARN
+from paint_deposition.nodes.node import WARN
 from paint_deposition.nodes.web_view import WebView
 from paint_deposition.report.colour_scales import film_scale
 from paint_deposition.report.live_page import STEP_UM, Page, Scene, Seen

@@ -22,7 +22,7 @@ from paint_deposition.part.zones import Box, Zone, Zones
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import ImproveRequest, PlanRequest
-from paint_deposition.report.pictures.planning import write_improvement_picture
+from paint_deposition.report.plan_pictures import write_improvement_picture
 from scenes import stamps_ns, straight_pass
 from surfaces import sheet
 

@@ -14,7 +14,7 @@ from paint_deposition.planning.placement import place_passes
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.planned_film import evenness
 from paint_deposition.planning.requests import PlanRequest
-from paint_deposition.report.writers.plans import write_passes
+from paint_deposition.report.write_plans import write_passes
 from scenes import painted
 from surfaces import sheet
 

@@ -19,7 +19,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest
-from paint_deposition.report.pictures.planning import draw_curve
+from paint_deposition.report.plan_pictures import draw_curve
 
 SYMMETRIC = DepositionModel(planar=PlanarPattern(K3=0.0))
 LOPSIDED = DepositionModel()

@@ -5,7 +5,7 @@ import pytest
 
 from booth import panel
 from folded_parts import bumper, hood
-from paint_deposition.planning.sprayable_faces import sprayable_faces
+from paint_deposition.planning.sides import sprayable_faces
 
 
 def outward(face) -> np.ndarray:

@@ -20,7 +20,7 @@ from paint_deposition.planning.passes import (
 )
 from paint_deposition.planning.planned_film import contacts
 from paint_deposition.planning.requests import GunEnvelope
-from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
+from paint_deposition.planning.sides import SurfaceMap, pass_axes
 from surfaces import sheet
 
 

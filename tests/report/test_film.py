@@ -22,12 +22,12 @@ from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
+from paint_deposition.report.colour_scales import BELOW, HIGH, WITHIN
 from paint_deposition.report.data import ReportData
+from paint_deposition.report.drawing import PartPicture, View, label_points, save_picture
+from paint_deposition.report.film_pictures import film_picture
 from paint_deposition.report.page import report_html
-from paint_deposition.report.pictures.film import film_picture
-from paint_deposition.report.pictures.part import PartPicture, View, label_points
-from paint_deposition.report.pictures.readings import comparison_figure
-from paint_deposition.report.style import BELOW, HIGH, WITHIN, save_picture
+from paint_deposition.report.readings_pictures import comparison_figure
 from report.web_page import Page
 from small_campaign import small_campaign
 from surfaces import triangulated

@@ -17,8 +17,8 @@ from rclpy.parameter import Parameter
 from generated.markdown import definitions, prose, table
 from paint_deposition.api.simulation import sample_folder
 from paint_deposition.nodes import executables
-from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.parameters import NodeParameter
+from paint_deposition.nodes.node import PaintNode
+from paint_deposition.nodes.parameters import NodeParameter
 
 # What a node needs to be given before it has its topics, besides a mesh.
 MESH = {'mesh_file': 'panel.stl', 'max_edge_length_m': 0.5}

@@ -10,7 +10,7 @@ from inference.diagnosis.linear import linear_fit
 from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a_back, study_of
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
-from paint_deposition.files.effect_trial import COVARIATES
+from paint_deposition.files.effect_file import COVARIATES
 from paint_deposition.inference.diagnosis import explanations
 from paint_deposition.inference.diagnosis.closed_forms import fitting_forms, forms_of
 from paint_deposition.inference.fitting.least_squares import derivatives

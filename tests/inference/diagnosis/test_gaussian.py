@@ -18,7 +18,7 @@ from paint_deposition.inference.diagnosis.model_space import SIZES
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.report.style import TWO_SIDED_95
+from paint_deposition.report.colour_scales import TWO_SIDED_95
 from reference import reference_film_um
 
 READINGS = 30

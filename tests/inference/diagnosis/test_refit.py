@@ -12,7 +12,7 @@ from paint_deposition.files.model_file import read_model_file
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.fitting.estimates import estimates
-from paint_deposition.report.writers.inference import write_fitted
+from paint_deposition.report.write_inference import write_fitted
 from small_campaign import small_campaign
 from virtual_paint_shop.files import write
 from virtual_paint_shop.shop import generate

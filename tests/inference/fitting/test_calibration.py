@@ -18,7 +18,7 @@ from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.panel import Panel, fit_collapse, short_reaches
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.report.writers.write import write as write_results
+from paint_deposition.report.write import write as write_results
 from virtual_paint_shop.files import write
 from virtual_paint_shop.shop import panel_study
 

@@ -7,7 +7,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 
 from paint_deposition.files.recordings.bag_files import open_bag
-from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes import topics
 
 
 class Listener(Node):

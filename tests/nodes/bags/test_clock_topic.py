@@ -11,7 +11,7 @@ from std_srvs.srv import Trigger
 
 from files.recorded import straight_pass
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes import topics
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from nodes.cell import START_NS
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.nodes.bags.initial_messages import InitialMessages
-from paint_deposition.nodes.runtime.topics import header, state_message
+from paint_deposition.nodes.topics import header, state_message
 
 POSE, STATE = '/atomizer/pose', '/atomizer/state'
 S = 1_000_000_000

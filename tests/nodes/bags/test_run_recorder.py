@@ -18,10 +18,10 @@ from nodes.cell import FACING_PANEL, Robot, parameters
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.pose_stream import TriggerChange
+from paint_deposition.nodes import topics
 from paint_deposition.nodes.bags import run_recorder
 from paint_deposition.nodes.index_planner import IndexPlanner
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.topics import header, header_stamp_ns, state_message
+from paint_deposition.nodes.topics import header, header_stamp_ns, state_message
 
 BEST_EFFORT = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 

@@ -18,9 +18,9 @@ from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.nodes import topics
 from paint_deposition.nodes.painting.film_display import ACKNOWLEDGE_TIMEOUT_S
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.topics import header_stamp_ns
+from paint_deposition.nodes.topics import header_stamp_ns
 from paint_deposition.part.surface import toward_the_guns
 
 MOTION = two_passes()

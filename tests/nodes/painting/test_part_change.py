@@ -22,9 +22,9 @@ from nodes.cell import PANEL_M, offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.model.eq1_pattern import Brush
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import ERROR, OK
-from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
+from paint_deposition.nodes import topics
+from paint_deposition.nodes.node import ERROR, OK
+from paint_deposition.nodes.topics import AdaptiveSubscription
 
 LATER_NS = 60_000_000_000
 SERVICE = '/deposition_simulator/change_part'

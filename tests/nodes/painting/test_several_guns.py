@@ -11,7 +11,7 @@ import paint_deposition as pd
 from nodes.cell import Robot, offline_um, two_passes
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.files.motion_files import MotionSource, read_gun_motions
-from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes import topics
 
 
 def moved(motion: pd.Trajectory, by_m: list[float]) -> pd.Trajectory:

@@ -11,7 +11,7 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from nodes.cell import parameters, two_passes
-from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes import topics
 
 MOTION = two_passes()
 

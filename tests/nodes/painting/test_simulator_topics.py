@@ -11,7 +11,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from nodes.cell import Robot, offline_um, two_passes
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.statistics import FIGURES, film_statistics
-from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes import topics
 from paint_deposition.report.colour_scales import FILM_PALETTE
 
 MOTION = two_passes()

@@ -11,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 
 from nodes.cell import Robot, offline_um, two_passes
-from paint_deposition.nodes.runtime.topics import header
+from paint_deposition.nodes.topics import header
 
 POSES = 'deposition_simulator: poses'
 UNTRIGGERED = two_passes(trigger=False)

@@ -69,8 +69,8 @@ from paint_deposition.planning.improvement import Improvement as Improvement
 from paint_deposition.planning.plan import Plan as Plan
 from paint_deposition.planning.recommendation import Recommendation as Recommendation
 from paint_deposition.planning.requests import GunEnvelope as GunEnvelope
-from paint_deposition.report.writers.write import plot as plot
-from paint_deposition.report.writers.write import write as write
+from paint_deposition.report.write import plot as plot
+from paint_deposition.report.write import write as write
 
 __version__: str
 

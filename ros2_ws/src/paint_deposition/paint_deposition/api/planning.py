@@ -38,8 +38,7 @@ from paint_deposition.planning.requests import (
     PlanRequest,
 )
 from paint_deposition.planning.retiming import retime_for_evenness
-from paint_deposition.planning.sprayable_faces import WIDEST_RAD
-from paint_deposition.planning.surface_map import painted_side
+from paint_deposition.planning.sides import WIDEST_RAD, painted_side
 from paint_deposition.request import takes
 
 Progress = Callable[[str, float], None]

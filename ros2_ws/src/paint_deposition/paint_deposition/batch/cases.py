@@ -6,6 +6,7 @@ these are Parquet tables that a user opens, found again only by the same code of
 
 from __future__ import annotations
 
+import copyreg
 import hashlib
 import io
 import logging
@@ -246,12 +247,13 @@ def _deserialised(content: bytes) -> Any:
 def _serialised(value: Any) -> bytes:
     """Bytes that ``pickle.loads`` opens elsewhere; the files of users' effects run there."""
     content = io.BytesIO()
-    _EffectPickler(content, protocol=5).dump(value)
+    pickler = pickle.Pickler(content, protocol=5)
+    pickler.dispatch_table = copyreg.dispatch_table | {type(Effect): _class_reduced}
+    pickler.dump(value)
     return content.getvalue()
 
 
-class _EffectPickler(pickle.Pickler):
-    def reducer_override(self, value: Any) -> Any:
-        if isinstance(value, type) and issubclass(value, Effect) and value.file is not None:
-            return effect_of, (value.file, value.file_content)
-        return NotImplemented
+def _class_reduced(model: Any) -> Any:
+    """How to make the class of a user's effect elsewhere; the name of any other."""
+    file = getattr(model, 'file', None)
+    return (effect_of, (file, model.file_content)) if file else model.__qualname__

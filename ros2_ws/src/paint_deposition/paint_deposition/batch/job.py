@@ -131,7 +131,14 @@ class Job:
             raise BatchError('no mesh is given; give mesh')
         how = (file.mesh_scale, file.max_edge_length_m, None, file.body)
         surface = self._input('mesh', mesh, how, lambda: read_mesh(mesh, *how))
-        recorded = NOTHING if motion is None else self._motion(motion, values)
+        recorded = NOTHING
+        if motion is not None:
+            given = file.model_dump(include=set(MotionSource.model_fields))
+            arm = given['urdf'] = given['urdf'] and str(self.folder / given['urdf'])
+            if 'part_pose' in values:
+                given['part_pose'] = values['part_pose']
+            source, its = MotionSource.model_validate(given), [given, arm and sha256(Path(arm))]
+            recorded = self._input('trajectory', motion, its, lambda: read_motion(motion, source))
         if not file.readings:
             return surface, recorded, NOTHING
         path, part = self.folder / file.readings, self.inputs[surface]
@@ -139,14 +146,6 @@ class Job:
             'readings', path, surface, lambda: read_readings(path, None, surface=part)
         )
         return surface, recorded, places
-
-    def _motion(self, path: Path, values: Values) -> str:
-        given = self.file.model_dump(include=set(MotionSource.model_fields))
-        arm = given['urdf'] = given['urdf'] and str(self.folder / given['urdf'])
-        if 'part_pose' in values:
-            given['part_pose'] = values['part_pose']
-        source, how = MotionSource.model_validate(given), [given, arm and sha256(Path(arm))]
-        return self._input('trajectory', path, how, lambda: read_motion(path, source))
 
     def _options(self, values: Values, planned: bool) -> dict[str, Any]:
         file = self.file

@@ -20,8 +20,9 @@ from paint_deposition.batch.sweep_file import DRAW, read_sweep
 from paint_deposition.errors import BatchError
 from paint_deposition.files.atomic import write_json, write_parquet
 from paint_deposition.files.provenance import origin
-from paint_deposition.report.style import ACCENT, INK, new_figure, quiet, save_picture
-from paint_deposition.report.writers.write import written
+from paint_deposition.report.colour_scales import ACCENT, INK
+from paint_deposition.report.drawing import new_figure, quiet, save_picture
+from paint_deposition.report.write import written
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -11,7 +11,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.models import model_words
+from paint_deposition.cli.models import chosen_model
 from paint_deposition.cli.results import Progress, Results, print_all, results_options
 from paint_deposition.errors import PaintError
 
@@ -43,17 +43,14 @@ def _run(
     The ``verb`` takes of the model's file what it ``begins_with``, and ``lines`` put its result
     into words. The line on the model says whether it was ``fitted``, or is ``words``.
     """
-    from paint_deposition.files.effect_file import load_effect_file, load_unnamed_effect_file
-    from paint_deposition.files.model_file import read_model_file
-
     with Progress(command) as show:
         data = pd.read_campaign(
             campaign, show, part_pose,
             lambda kind, name, line: print_all(kind, [f'{name}: {line}']), zones_file,
         )  # fmt: skip
-        chosen = Path(model_file or data.model_file or '')
-        load = load_effect_file if model_file else load_unnamed_effect_file
-        start = read_model_file(chosen, load) if chosen.name else None
+        named = model_file or data.model_file
+        chosen = chosen_model(Path(named) if named else None, named=bool(model_file))
+        start = chosen.known if named else None
         known = {name: getattr(start, name, None) for name in begins_with}
         result = verb(data, progress=show, **known)
         show('writing')
@@ -65,7 +62,7 @@ def _run(
     for name, found in first.geometry.items() if first is result else ():
         said.append(f'{name}: {found.sentence}')
         warnings += (f'{name}: {line}' for line in found.warnings)
-    source = model_words(chosen, start) if start else 'a 50 mm bell'
+    source = chosen.words if start else 'a 50 mm bell'
     begin = 'fitted to the campaign, from ' if fitted or start is None else ''
     results.print(said, words or begin + source, data.understood, warnings)
 
@@ -256,7 +253,7 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
     """Write the law learned last as an effect, and say how to use it."""
     from paint_deposition.effects.learned_curves import LearnedCurve
     from paint_deposition.inference.diagnosis.closed_forms import forms_of
-    from paint_deposition.report.writers.inference import effect_entry, write_effect_file
+    from paint_deposition.report.write_inference import effect_entry, write_effect_file
 
     law, forms = diagnosis.model.effects[-1], forms_of(diagnosis.model.effects[-1])
     if not forms or not isinstance(law, LearnedCurve):

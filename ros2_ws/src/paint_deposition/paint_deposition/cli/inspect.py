@@ -99,12 +99,7 @@ def _contents(
     from paint_deposition.files.recordings.bags import BOOL_TYPE
     from paint_deposition.files.recordings.messages import STATE_TYPE
     from paint_deposition.files.recordings.pose_topics import sources_of_poses
-    from paint_deposition.files.tables.poses import (
-        holds_quaternions,
-        is_pose_table,
-        may_hold_poses,
-    )
-    from paint_deposition.files.tables.readings import holds_readings
+    from paint_deposition.files.tables.poses import holds_readings, is_pose_table
     from paint_deposition.files.tables.sheets import is_gauge_file
     from paint_deposition.request import validate
 
@@ -113,11 +108,7 @@ def _contents(
         _only('a mesh', 'mesh_scale', 'body')
         return _mesh_contents(path, part)
     is_table = is_pose_table(path)
-    of_readings = (
-        is_table and not holds_quaternions(path)
-        and (points_file or holds_readings(path) or not may_hold_poses(path))
-    )  # fmt: skip
-    if is_gauge_file(path) or of_readings:
+    if is_gauge_file(path) or (is_table and holds_readings(path, points_file is not None)):
         _only('gauge readings', 'points_file')
         return _readings_contents(path, points_file)
     if is_table:
@@ -294,10 +285,10 @@ def _gun_on_part(
     with Progress('inspect') as show:
         show('reading')
         recorded = pd.read_recording(path, **motion)
-        model = model_for(model_file, path).model
+        model = model_for(model_file, path).known.model
         seen = pd.look_at(part.surface(), recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:
-            from paint_deposition.report.pictures.planning import write_geometry_picture
+            from paint_deposition.report.plan_pictures import write_geometry_picture
 
             show('drawing')
             title = f'{path.name} over {Path(str(part.mesh)).name}'

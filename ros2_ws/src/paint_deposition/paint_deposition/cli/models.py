@@ -15,29 +15,16 @@ from paint_deposition.errors import ModelError
 
 if TYPE_CHECKING:
     from paint_deposition.files.model_file import ModelFile
-    from paint_deposition.inference.fitting.parameters import Posterior
     from paint_deposition.planning.driving import RobotCell
 
 
 @dataclass(frozen=True)
 class ChosenModel:
-    """A model, where it came from (None: the default), and the line for the user."""
+    """A model with what is known of it, the file that it is from, and the line for the user."""
 
-    file: ModelFile | None
-    path: Path | None
+    known: ModelFile
+    path: Path | None  # None: it is the default, a 50 mm bell
     words: str
-    brush: int = 0
-
-    @property
-    def model(self) -> pd.DepositionModel:
-        """The model of the file, else that of a 50 mm bell."""
-        model = self.file.model if self.file else pd.DepositionModel()
-        return model.with_brush(self.brush) if self.brush else model
-
-    @property
-    def posterior(self) -> Posterior | None:
-        """What the file says is known of the model."""
-        return self.file.posterior if self.file else None
 
 
 def chosen_model(given: Path | None, brush: int = 0, named: bool = True) -> ChosenModel:
@@ -46,13 +33,15 @@ def chosen_model(given: Path | None, brush: int = 0, named: bool = True) -> Chos
     A file that is not ``named`` by the user, but by a recording, runs no effect files unasked.
     """
     from paint_deposition.files.effect_file import load_effect_file, load_unnamed_effect_file
-    from paint_deposition.files.model_file import read_model_file
+    from paint_deposition.files.model_file import ModelFile, read_model_file
 
-    if given is None:
-        return ChosenModel(None, None, 'default, a 50 mm bell; --model gives another', brush)
-    file = read_model_file(given, load_effect_file if named else load_unnamed_effect_file)
-    words = model_words(given, file) + (f', brush {brush}' if brush else '')
-    return ChosenModel(file, given, words, brush)
+    file, words = ModelFile(pd.DepositionModel()), 'default, a 50 mm bell; --model gives another'
+    if given is not None:
+        file = read_model_file(given, load_effect_file if named else load_unnamed_effect_file)
+        words = model_words(given, file) + (f', brush {brush}' if brush else '')
+    if brush:
+        file = replace(file, model=file.model.with_brush(brush))
+    return ChosenModel(file, given, words)
 
 
 def model_for(given: Path | None, motion: Path, named: bool = True) -> ChosenModel:
@@ -67,8 +56,8 @@ def model_for(given: Path | None, motion: Path, named: bool = True) -> ChosenMod
     if planned is None:
         return chosen
     path, digest = planned
-    if chosen.file is not None:
-        model = chosen.model
+    if given is not None:
+        model = chosen.known.model
         alike = [model, *(model.with_brush(brush.number) for brush in model.brushes)]
         if digest not in map(model_digest, alike):
             print_all('note', [f'{motion} was planned with another model ({digest[:12]})'])

@@ -86,7 +86,7 @@ def options_of(
         if not issubclass(kind, Request):
             return values
         own = {name: value for name, value in values.items() if value is not None}
-        return kind(**{n: math.radians(v) if _is_angle(n) else v for n, v in own.items()})
+        return kind(**{n: math.radians(v) if n.endswith('_rad') else v for n, v in own.items()})
 
     return option_group(options, into, made, called)
 
@@ -129,7 +129,7 @@ def option_of(kind: type[BaseModel], name: str, **settings: Any) -> Decorator:
     """
     field = kind.model_fields[name]
     known = field.get_default(call_default_factory=True)
-    shown: Callable[[Any], Any] = math.degrees if _is_angle(name) else lambda value: value
+    shown: Callable[[Any], Any] = math.degrees if name.endswith('_rad') else lambda value: value
     default = None if known is None else shown(known)
     found = _type(field.annotation, field.metadata, shown)
     found |= {'help': field.description, 'default': default}
@@ -140,17 +140,13 @@ def option_of(kind: type[BaseModel], name: str, **settings: Any) -> Decorator:
     return click.option(*_names(name, field), name, **found | settings)
 
 
-def _is_angle(name: str) -> bool:
-    return name.endswith('_rad')
-
-
 def _extra(field: FieldInfo) -> dict[str, Any]:
     return field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
 
 
 def _names(name: str, field: FieldInfo) -> list[str]:
     """What the option of a field is called."""
-    usual = f'--{name.removesuffix("_rad")}-deg' if _is_angle(name) else f'--{name}'
+    usual = f'--{name.removesuffix("_rad")}-deg' if name.endswith('_rad') else f'--{name}'
     return str(_extra(field).get('option', usual.replace('_', '-'))).split()
 
 

@@ -37,8 +37,8 @@ def recommend_command(
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
     chosen = chosen_model(model_file, brush=brush)
-    answer = pd.recommend(chosen.model, **dict(request))
-    results.write(answer, model=chosen.model, made_from=inputs(model_file=model_file))
+    answer = pd.recommend(chosen.known.model, **dict(request))
+    results.write(answer, model=chosen.known.model, made_from=inputs(model_file=model_file))
     lines = [answer.sentence, f'SB50 of one pass: {1e3 * answer.sb50_m:.0f} mm']
     lines += (
         f'minimum: sigma_n {100 * minimum.sigma_n:.2f} % at {1e3 * minimum.index_m:.0f} mm'
@@ -118,11 +118,11 @@ def plan_command(
         }  # fmt: skip
         result: pd.Plan | pd.PartPlan
         if faces == 'one':
-            result = pd.plan(surface, chosen.model, **given)
+            result = pd.plan(surface, chosen.known.model, **given)
         else:
             if face_angle_deg is not None:
                 given['face_angle_deg'] = face_angle_deg
-            result = pd.plan_faces(surface, chosen.model, **given)
+            result = pd.plan_faces(surface, chosen.known.model, **given)
         show('writing')
         made_from = {
             **inputs(mesh_file=part.mesh, model_file=model_file, zones_file=part.zones_file),
@@ -218,7 +218,7 @@ def improve_command(
         recorded = pd.read_recording(trajectory, **known)
         show('refining the mesh')
         result = pd.improve(
-            part.surface(), recorded, chosen.model, posterior=chosen.posterior,
+            part.surface(), recorded, chosen.known.model, posterior=chosen.known.posterior,
             rivals=[pd.read_model(path) for path in rivals], robot=cell, zones=part.zones(),
             seed=seed, progress=show, **dict(request),
         )  # fmt: skip

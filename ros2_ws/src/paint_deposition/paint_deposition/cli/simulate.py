@@ -102,7 +102,7 @@ def simulate_command(
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(
-            surface, motions, [model.model for model in chosen], names=names, coats=coats,
+            surface, motions, [one.known.model for one in chosen], names=names, coats=coats,
             wet_on_wet=wet_on_wet, readings=readings, max_pose_gap_s=max_pose_gap_s, zones=zones,
             strict=source.strict, progress=show, **dict(band),
         )  # fmt: skip
@@ -289,13 +289,15 @@ def measure_command(
         warnings: tuple[str, ...] = ()
         if trajectory is None:
             chosen = chosen_model(model_file, brush=brush)
-            recorded = pd.plan(surface, chosen.model, progress=show, **dict(passes)).trajectory
+            recorded = pd.plan(
+                surface, chosen.known.model, progress=show, **dict(passes)
+            ).trajectory
         else:
             chosen = model_for(model_file, trajectory)
             recorded = pd.read_recording(trajectory, **motion)
             warnings = recorded.warnings
         result = pd.choose_readings(
-            surface, recorded, chosen.model, posterior=chosen.posterior,
+            surface, recorded, chosen.known.model, posterior=chosen.known.posterior,
             max_pose_gap_s=max_pose_gap_s, progress=show, **dict(request),
         )  # fmt: skip
         made_from = inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=chosen.path)

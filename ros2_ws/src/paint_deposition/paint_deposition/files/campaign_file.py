@@ -10,13 +10,7 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.atomic import read_yaml
-from paint_deposition.files.campaign_coats import (
-    PaintJob,
-    dried,
-    laid_coats,
-    laid_path,
-    solids_of,
-)
+from paint_deposition.files.campaign_coats import PaintJob, dried, laid_coats, laid_path, solids_of
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion

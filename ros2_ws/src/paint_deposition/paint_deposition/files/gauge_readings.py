@@ -12,13 +12,7 @@ import numpy as np
 from paint_deposition.errors import ReadingsError, some
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.tables.headings import LENGTHS, shown
-from paint_deposition.files.tables.reading_columns import (
-    AXES,
-    NORMALS,
-    ON_FACE,
-    Layout,
-    format_of,
-)
+from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout, format_of
 from paint_deposition.files.tables.readings import GUESSED, ReadingTable
 from paint_deposition.files.tables.sheets import FORMULA
 from paint_deposition.inference.readings.places import on_face_m

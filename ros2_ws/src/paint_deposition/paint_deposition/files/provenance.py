@@ -14,13 +14,7 @@ from typing import Any
 from paint_deposition import __version__, git_version
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError
-from paint_deposition.files.atomic import (
-    BLOCK_BYTES,
-    json_text,
-    plain,
-    read_file,
-    require_file,
-)
+from paint_deposition.files.atomic import BLOCK_BYTES, json_text, plain, read_file, require_file
 from paint_deposition.files.effect_file import load_unnamed_effect_file
 from paint_deposition.files.model_file import ModelFile, model_source, read_model_file
 from paint_deposition.files.rapid.program import is_rapid

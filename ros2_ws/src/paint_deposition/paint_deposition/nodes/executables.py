@@ -15,7 +15,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 # Newer ones read it, too, if both are set.
 FAST_DDS_FILES = 'FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE'
 if not any(name in os.environ for name in FAST_DDS_FILES):
-    announced_often = str(Path(__file__).with_name('runtime') / 'fastdds.xml')
+    announced_often = str(Path(__file__).with_name('fastdds.xml'))
     os.environ[FAST_DDS_FILES[os.environ.get('ROS_DISTRO') == 'jazzy']] = announced_often
 
 
@@ -33,19 +33,19 @@ def _run(name: str, place: str, node_class: str) -> int:
             sys.stderr.write(f'{name}: needs {needed}; {remedy}\n')
             return 2
     module = importlib.import_module(f'paint_deposition.nodes.{place}')
-    base = importlib.import_module('paint_deposition.nodes.runtime.node')
+    base = importlib.import_module('paint_deposition.nodes.node')
     return base.run_node(getattr(module, node_class), signals)
 
 
-atomizer_source = partial(_run, 'atomizer_source', 'robot.atomizer_source', 'AtomizerSource')
+atomizer_source = partial(_run, 'atomizer_source', 'atomizer_source', 'AtomizerSource')
 bag_player = partial(_run, 'bag_player', 'bags.bag_player', 'BagPlayer')
 deposition_simulator = partial(
     _run, 'deposition_simulator', 'painting.deposition_simulator', 'DepositionSimulator'
 )
-egm_source = partial(_run, 'egm_source', 'robot.egm_source', 'EgmSource')
+egm_source = partial(_run, 'egm_source', 'egm_source', 'EgmSource')
 index_planner = partial(_run, 'index_planner', 'index_planner', 'IndexPlanner')
 model_comparison = partial(_run, 'model_comparison', 'model_comparison', 'ModelComparison')
-opcua_source = partial(_run, 'opcua_source', 'robot.controllers', 'OpcuaSource')
+opcua_source = partial(_run, 'opcua_source', 'controllers', 'OpcuaSource')
 run_recorder = partial(_run, 'run_recorder', 'bags.run_recorder', 'RunRecorder')
-rws_source = partial(_run, 'rws_source', 'robot.controllers', 'RwsSource')
+rws_source = partial(_run, 'rws_source', 'controllers', 'RwsSource')
 web_view = partial(_run, 'web_view', 'web_view', 'WebView')

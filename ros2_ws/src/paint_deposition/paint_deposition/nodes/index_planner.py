@@ -19,20 +19,20 @@ from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.nodes import topics
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.painting.painting_parameters import (
     model_from_parameters,
     model_parameters,
 )
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import (
+from paint_deposition.nodes.parameters import (
     NodeParameter,
     direction_parameter,
     fixed,
     mesh_parameters,
     requested,
 )
-from paint_deposition.nodes.runtime.topics import header, pose_message
+from paint_deposition.nodes.topics import header, pose_message
 from paint_deposition.planning.plan import Plan, kept_clear, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRequest

@@ -17,14 +17,14 @@ from paint_deposition.inference.readings.gauge_noise import gauge_noise
 from paint_deposition.inference.readings.plausibility import readings_in_doubt, zeros_in_doubt
 from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.motion.path import SprayPath
+from paint_deposition.nodes import topics
+from paint_deposition.nodes.node import OK, WARN, Status, Task
 from paint_deposition.nodes.painting.film_display import legend
 from paint_deposition.nodes.painting.health import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
-from paint_deposition.nodes.runtime.parameters import CONFIGURED, NodeParameter, fixed
-from paint_deposition.nodes.runtime.topics import ColouredMesh, header
+from paint_deposition.nodes.parameters import CONFIGURED, NodeParameter, fixed
+from paint_deposition.nodes.topics import ColouredMesh, header
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, turned
 from paint_deposition.report.colour_scales import ColourScale, residual_scale

@@ -20,20 +20,20 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns, transforms_of, trigger_change
 from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.transforms import PART_POSE_TOPIC, NoTransform
-from paint_deposition.nodes.painting.frames import PartFrame, TfQueue, placed_in_order
+from paint_deposition.nodes import topics
+from paint_deposition.nodes.frames import PartFrame, TfQueue, placed_in_order
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.painting.painting_parameters import read_part
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import (
+from paint_deposition.nodes.parameters import (
+    DISPLAY,
     NodeParameter,
     atomizers_parameter,
     direction_parameter,
-    display_parameters,
     fixed,
     mesh_parameters,
     require_display,
 )
-from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
+from paint_deposition.nodes.topics import AdaptiveSubscription, gun_topic
 from paint_deposition.part.surface import turned
 from paint_deposition.report.colour_scales import film_scale
 from paint_deposition.report.live_page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page, Scene
@@ -46,7 +46,7 @@ class WebView(PaintNode):
     """
 
     NAME = 'web_view'
-    PARAMETERS = display_parameters() | dict(
+    PARAMETERS = dict(DISPLAY) | dict(
         fixed(
             'the page is served with it; restart the node with the new value',
             **mesh_parameters(max_edge_length_m=0.01),

@@ -23,12 +23,7 @@ from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.planning.passes import (
-    PlannedPass,
-    plan_passes,
-    planned_moves,
-    trajectory_of,
-)
+from paint_deposition.planning.passes import PlannedPass, plan_passes, planned_moves, trajectory_of
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.planned_film import (
     PlannedFilm,
@@ -38,10 +33,9 @@ from paint_deposition.planning.planned_film import (
     predicted,
     simulated,
 )
-from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
-from paint_deposition.planning.retiming import retime_for_evenness
-from paint_deposition.planning.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
+from paint_deposition.planning.retiming import timed_evenly
+from paint_deposition.planning.sides import WIDEST_RAD, Face, sprayable_faces
 
 # Of one face, in running order.
 Passes = tuple[PlannedPass, ...]
@@ -136,6 +130,7 @@ def plan_faces(
     )
     margin_m, laid, unblended = _blended(surface, model, each, faces, wanted, progress)
     running = order_faces(laid)
+    passes = tuple(planned for face in running for planned in face)
     progress('motion', 0.0)
     trajectory, moves = join_motions(
         running, frame_id, lambda way: not contacts(surface, way, envelope)
@@ -146,16 +141,10 @@ def plan_faces(
             area_m2, (film_um, _) = surface.vertex_areas_m2, simulated(surface, model, trajectory)
             target_um, _ = evenness(film_um[painted], area_m2[painted])
         wanted_cm3 = target_um * float(surface.vertex_areas_m2[wanted.region].sum())
-        start_s = sum(one.sprayed_m / one.speed_m_per_s for face in running for one in face)
-        asked = request.improvement(
-            running[0][0].style.overspray_m, request.target_um,
-            paint=model.planar.K1_cm3_per_s * start_s / wanted_cm3,
-            time=start_s / trajectory.duration_s,
+        trajectory, moves = timed_evenly(
+            surface, model, request, wanted, passes, trajectory, request.target_um, wanted_cm3,
+            trajectory.duration_s, progress,
         )  # fmt: skip
-        retimed = retime_for_evenness(
-            surface, wanted, Programme.of(trajectory), [model], asked, progress, explain=False
-        ).programme
-        trajectory, moves = retimed.trajectory(), tuple(moves_of(retimed, asked))
     found = predicted(surface, model, request, wanted, trajectory)
     sigma_n = found['sigma_n']
     if request.tolerance is not None and sigma_n > request.tolerance:
@@ -165,8 +154,7 @@ def plan_faces(
             'allow that much, or narrower faces (--face-angle-deg)'
         )
     return PartPlan(
-        **found, passes=tuple(planned for face in running for planned in face),
-        moves=moves, faces=faces, margin_m=margin_m,
+        **found, passes=passes, moves=moves, faces=faces, margin_m=margin_m,
         sigma_n_unblended=unblended,
     )  # fmt: skip
 

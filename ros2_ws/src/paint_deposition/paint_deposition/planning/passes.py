@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered
-from paint_deposition.planning.surface_map import SurfaceMap
+from paint_deposition.planning.sides import SurfaceMap
 
 WAYPOINT_STEP_M = 0.01
 # A robot program takes every so many waypoints: within 1 mm of a curve of 0.25 m radius.

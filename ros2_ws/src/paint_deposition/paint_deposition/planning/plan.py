@@ -12,7 +12,6 @@ from paint_deposition.errors import PlanError
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.planning.driving import RobotCell
-from paint_deposition.planning.index_search import passes_to_cover
 from paint_deposition.planning.passes import (
     WAYPOINT_STEP_M,
     WAYPOINTS_PER_MOVE,
@@ -25,6 +24,7 @@ from paint_deposition.planning.placement import (
     LineFilms,
     Placement,
     best_placement,
+    passes_to_cover,
     place_passes,
     placement_at,
 )
@@ -39,8 +39,8 @@ from paint_deposition.planning.planned_film import (
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
-from paint_deposition.planning.retiming import retime_for_evenness
-from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
+from paint_deposition.planning.retiming import timed_evenly
+from paint_deposition.planning.sides import SurfaceMap, pass_axes
 
 Planned = TypeVar('Planned', bound=PlannedFilm)
 
@@ -269,24 +269,18 @@ def _timed_plan(
         replace(planned, speed_m_per_s=speed)
         for planned in plan_passes(unoptimised.line_films.surface_map, lines, style)
     )
-    programme = Programme.of(trajectory_of(passes, unoptimised.trajectory.frame_id))
-    start_s = sum(planned.sprayed_m / speed for planned in passes)
-    zones = unoptimised.wanted.zones
-    wanted = request.improvement(
-        unoptimised.style.overspray_m, request.target_um if zones else target_um,
-        paint=unoptimised.model.planar.K1_cm3_per_s * start_s / wanted_cm3,
-        time=start_s / unoptimised.cycle_time_s,
+    zones, model = unoptimised.wanted.zones, unoptimised.model
+    trajectory, moves = timed_evenly(
+        surface, model, request, unoptimised.wanted, passes,
+        trajectory_of(passes, unoptimised.trajectory.frame_id),
+        request.target_um if zones else target_um, wanted_cm3, unoptimised.cycle_time_s, progress,
     )  # fmt: skip
-    models = [unoptimised.model]
-    retimed = retime_for_evenness(
-        surface, unoptimised.wanted, programme, models, wanted, progress, explain=False
-    ).programme
     found = predicted(
-        surface, unoptimised.model, request, unoptimised.wanted, retimed.trajectory(),
+        surface, model, request, unoptimised.wanted, trajectory,
         lambda share: progress('film', share),
     )  # fmt: skip
     return replace(
-        unoptimised, **found, style=style, passes=passes, moves=tuple(moves_of(retimed, wanted)),
+        unoptimised, **found, style=style, passes=passes, moves=moves,
         placement=replace(placement, sigma_n=found['sigma_n']), unoptimised=unoptimised,
     )  # fmt: skip
 

@@ -276,14 +276,6 @@ class PlannedFilm:
         return spray_path(self.trajectory)[0]
 
     @property
-    def _sprayed(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) travel with the gun open, and how long it takes [s], of each pass."""
-        sprayed = self.path.select(self.path.flow > 0.0)
-        _, number = np.unique(sprayed.spray_pass, return_inverse=True)
-        travel_m = np.bincount(number, sprayed.dwell_s * sprayed.speed_m_per_s)
-        return travel_m, np.bincount(number, sprayed.dwell_s)
-
-    @property
     def sentence(self) -> str:
         """The plan in a sentence."""
         return (
@@ -332,7 +324,11 @@ class PlannedFilm:
 
     def to_dict(self) -> dict[str, Any]:
         """Figures of the plan."""
-        travel_m, seconds = self._sprayed
+        # Of each pass with the gun open: travel, and how long it takes.
+        sprayed = self.path.select(self.path.flow > 0.0)
+        _, number = np.unique(sprayed.spray_pass, return_inverse=True)
+        travel_m = np.bincount(number, sprayed.dwell_s * sprayed.speed_m_per_s)
+        seconds = np.bincount(number, sprayed.dwell_s)
         return {
             'direction': self.request.direction,
             'passes': len(self.passes),

@@ -10,7 +10,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq3_collapse import half_width_m
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
-from paint_deposition.planning.index_search import (
+from paint_deposition.planning.placement import (
     SEARCHED,
     IndexCurve,
     Minimum,
@@ -144,7 +144,12 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     index_drift = standoff_drift = None
     if windows:
         index_drift = next(w for w in windows if w[0] - NEAR <= best.index_m <= w[1] + NEAR)
-        standoff_drift = _standoff_drift_m(model, standoff, best.index_m, index_drift)
+        if not model.effects:
+            # The bare projection widens a pass in proportion to its distance from the emission
+            # point, which is as good as a narrower index.
+            distance = standoff + model.projection.emission_offset_m
+            nearer, further = (distance * (best.index_m / end - 1.0) for end in index_drift[::-1])
+            standoff_drift = max(nearer, -standoff), further
     notes = _notes(model, request, curve, best, speed)
     if searched != request.index_range_m(width):
         notes.append(
@@ -177,21 +182,6 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         standoff_drift_m=standoff_drift,
         notes=tuple(notes),
     )
-
-
-def _standoff_drift_m(
-    model: DepositionModel, standoff_m: float, index_m: float, window_m: tuple[float, float]
-) -> tuple[float, float] | None:
-    """How far the standoff may drift where the index may go to the ends of a window.
-
-    The bare projection widens a pass in proportion to its distance from the emission point, which
-    is as good as a narrower index; effects may depend on the standoff by themselves.
-    """
-    if model.effects:
-        return None
-    distance = standoff_m + model.projection.emission_offset_m
-    nearer, further = (distance * (index_m / end - 1.0) for end in window_m[::-1])
-    return max(nearer, -standoff_m), further
 
 
 def _within_speeds(

@@ -177,13 +177,9 @@ class PlanRequest(Limits, PassRequest):
     )
 
     @model_validator(mode='after')
-    def _has_a_side(self) -> 'PlanRequest':
+    def _side_and_index(self) -> 'PlanRequest':
         if self.outward is not None and not any(self.outward):
             raise PlanError('outward is 0 0 0; give a direction, 0 -1 0 say')
-        return self
-
-    @model_validator(mode='after')
-    def _index_in_range(self) -> 'PlanRequest':
         for end, side in ((self.index_min_m, 1.0), (self.index_max_m, -1.0)):
             if self.index_m is not None and end is not None and side * (end - self.index_m) > 0.0:
                 name = 'index_min_m' if side > 0.0 else 'index_max_m'

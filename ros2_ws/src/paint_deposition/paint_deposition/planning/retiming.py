@@ -7,12 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.motion.programmed import Move
+from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.nodes import FilmAtPoints, Nodes, retime, speed_bounds
+from paint_deposition.planning.passes import PlannedPass
 from paint_deposition.planning.planned_film import WantedFilm, stratified_sample
-from paint_deposition.planning.programme import Opening, Programme
+from paint_deposition.planning.programme import Opening, Programme, moves_of
 from paint_deposition.planning.quadratic_program import Density, Problem, solve
-from paint_deposition.planning.requests import ImproveRequest
+from paint_deposition.planning.requests import ImproveRequest, PlanRequest
 
 # Rounds of the solver where an approximate solution is enough: triggers, and the cost of limits.
 ROUGH_ROUNDS = 3
@@ -128,6 +131,35 @@ def retime_for_evenness(
         free = [(problem, found), *free]
         of_path = min(now, *(_solved_sigma_n(one.relaxed(), start) for one, start in free))
     return Retiming(original, timed, target_um, found.binding, limits, of_path)
+
+
+def timed_evenly(
+    surface: Surface,
+    model: DepositionModel,
+    request: PlanRequest,
+    wanted: WantedFilm,
+    passes: Sequence[PlannedPass],
+    trajectory: Trajectory,
+    target_um: float | None,
+    wanted_cm3: float,
+    cycle_time_s: float,
+    progress: Callable[[str, float], None],
+) -> tuple[Trajectory, tuple[Move, ...]]:
+    """The motion along planned passes at the speeds that lay an even film, and its moves.
+
+    The weights of the request are for the paint that the passes spray over the paint wanted, and
+    for the time that they spray over the cycle time of the plan to begin with.
+    """
+    sprayed_s = sum(one.sprayed_m / one.speed_m_per_s for one in passes)
+    asked = request.improvement(
+        passes[0].style.overspray_m, target_um,
+        paint=model.planar.K1_cm3_per_s * sprayed_s / wanted_cm3, time=sprayed_s / cycle_time_s,
+    )  # fmt: skip
+    original = Programme.of(trajectory)
+    retimed = retime_for_evenness(
+        surface, wanted, original, [model], asked, progress, explain=False
+    ).programme
+    return retimed.trajectory(), tuple(moves_of(retimed, asked))
 
 
 def _solved_sigma_n(problem: Problem, start: Density) -> float:

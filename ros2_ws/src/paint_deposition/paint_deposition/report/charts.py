@@ -14,9 +14,17 @@ from paint_deposition.effects.learned_laws import (
 )
 from paint_deposition.inference.diagnosis.closed_forms import forms_of, variable_at
 from paint_deposition.inference.diagnosis.verdict import percent
-from paint_deposition.report.colour_scales import COOLWARM, VIRIDIS
+from paint_deposition.report.colour_scales import (
+    ACCENT,
+    BEFORE,
+    COOLWARM,
+    GRID,
+    INK,
+    MUTED,
+    TWO_SIDED_95,
+    VIRIDIS,
+)
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.style import ACCENT, BEFORE, GRID, INK, MUTED, TWO_SIDED_95
 from paint_deposition.report.words import (
     capital,
     covariate_label,

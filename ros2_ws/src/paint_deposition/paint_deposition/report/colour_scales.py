@@ -1,4 +1,4 @@
-"""Film and residual as colours, the same in viewers, files and pictures."""
+"""Colours: of film and residual in viewers, files and pictures, and of charts and pages."""
 
 import math
 from dataclasses import dataclass
@@ -11,11 +11,25 @@ import numpy as np
 VIRIDIS, COOLWARM = np.load(Path(__file__).with_name('colour_maps.npy'))
 TABLE = 256
 # Rows of a palette behind the map's own colours.
-UNDER, OVER, BARE = TABLE, TABLE + 1, TABLE + 2
+UNDER_ROW, OVER_ROW, BARE_ROW = TABLE, TABLE + 1, TABLE + 2
 # None of them is near a colour of the maps, in CIELAB by 30 at least.
 UNDER_RGB = (250, 153, 191)
 OVER_RGB = (214, 38, 41)
 BARE_RGB = (158, 158, 158)
+
+# Of charts and pages.
+INK = '#1f2933'
+MUTED = '#616e7c'
+GRID = '#e4e7eb'
+BEFORE = '#9aa5b1'
+ACCENT = '#00708c'
+# Film below, within and above the target band, and bare metal; distinct to the colour-blind too.
+BELOW, WITHIN, HIGH, BARE = '#3f6fb0', '#b9dcae', '#e07b1f', '#9e9e9e'
+COMPONENTS = ('#d1701f', '#7a5195', '#4c9a2a')
+# Models side by side; as many as can be distinguished.
+MODELS = (ACCENT, *COMPONENTS, '#b5485f', '#8a7a2b')
+# 95 % of normally distributed readings lie within so many standard deviations.
+TWO_SIDED_95 = 1.96
 
 
 def _palette(
@@ -23,7 +37,7 @@ def _palette(
 ) -> np.ndarray:
     colours = np.empty((TABLE + 3, 4), dtype=np.uint8)
     colours[:TABLE, :3] = table
-    colours[UNDER, :3], colours[OVER, :3], colours[BARE, :3] = under, over, BARE_RGB
+    colours[UNDER_ROW, :3], colours[OVER_ROW, :3], colours[BARE_ROW, :3] = under, over, BARE_RGB
     colours[:, 3] = 255
     colours.setflags(write=False)
     return colours
@@ -48,9 +62,9 @@ class ColourScale:
         """(V,) row of the palette for each value (V,); bare where not ``shown`` (V,) bool."""
         share = (values - self.low) * (TABLE / (self.high - self.low))
         row = np.clip(np.nan_to_num(share), 0, TABLE - 1).astype(np.int16)
-        row[values < self.low] = UNDER
-        row[values > self.high] = OVER
-        row[~shown | np.isnan(values)] = BARE
+        row[values < self.low] = UNDER_ROW
+        row[values > self.high] = OVER_ROW
+        row[~shown | np.isnan(values)] = BARE_ROW
         return row
 
     def rgba(self, values: np.ndarray, shown: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import root_mean_square
 from paint_deposition.report import words
-from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS, TWO_SIDED_95
+from paint_deposition.report.colour_scales import ACCENT, BEFORE, INK, MODELS, TWO_SIDED_95
 
 # What a parameter of the pattern is called: symbol, meaning, unit.
 SYMBOLS = {

@@ -24,7 +24,7 @@ from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.planning.improvement import FilmSummary, Improvement
 from paint_deposition.report import charts, words
-from paint_deposition.report.colour_scales import film_scale
+from paint_deposition.report.colour_scales import TWO_SIDED_95, film_scale
 from paint_deposition.report.data import (
     ReportData,
     blind_rows,
@@ -34,15 +34,14 @@ from paint_deposition.report.data import (
     law_rows,
     pattern_rows,
 )
-from paint_deposition.report.pictures.film import page_film
-from paint_deposition.report.pictures.part import PartPicture
-from paint_deposition.report.pictures.planning import improved_figures
-from paint_deposition.report.pictures.readings import (
+from paint_deposition.report.drawing import DOTS_PER_INCH, PartPicture
+from paint_deposition.report.film_pictures import page_film
+from paint_deposition.report.plan_pictures import improved_figures
+from paint_deposition.report.readings_pictures import (
     part_figures,
     profile_figures,
     residual_figures,
 )
-from paint_deposition.report.style import DOTS_PER_INCH, TWO_SIDED_95
 
 TEMPLATES = Path(__file__).parent / 'templates'
 # A figure of a page: label, before or '', after, unit or remark.

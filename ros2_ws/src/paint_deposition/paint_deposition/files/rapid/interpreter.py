@@ -1,6 +1,6 @@
 """Running a RAPID program: its control flow and the calls of its routines."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import count
@@ -40,16 +40,12 @@ class _Exit(Exception):
 class Interpreter(Values):
     """Runs a program. What acts on the robot and the gun is the business of a subclass."""
 
+    # Of the subclass: do what an instruction does to the robot or the gun, and whether it does
+    # anything; the same without doing it.
+    act: Callable[[Instruction], bool]
+    acts: Callable[[Instruction], bool]
     _running: tuple[Routine, ...] = ()
     _count = 0.0
-
-    def act(self, i: Instruction) -> bool:
-        """Do what an instruction does to the robot or the gun; whether it does anything."""
-        raise NotImplementedError
-
-    def acts(self, i: Instruction) -> bool:
-        """Whether an instruction does anything to the robot or the gun."""
-        raise NotImplementedError
 
     def run(self, start: Routine) -> str:
         """Run a program from the start of a procedure on; what was passed over, with its lines."""
@@ -115,7 +111,7 @@ class Interpreter(Values):
             self._step()
             if isinstance(statement, Instruction):
                 self._instruction(statement)
-            else:
+            elif statement.rule != 'label':  # which only GOTO needs, and that is refused
                 getattr(self, f'_{statement.rule}')(*statement.children)
 
     def _step(self, count: float = 1.0) -> None:
@@ -169,9 +165,6 @@ class Interpreter(Values):
 
     def _declaration(self, *data: Datum) -> None:
         self._local |= {datum.name: replace(datum) for datum in data}
-
-    def _label(self, name: Token) -> None:
-        """Only GOTO needs it, which is refused."""
 
     def _connect(self, word: Token, _: Node, trap: Token) -> None:
         routine = self.routine(trap)

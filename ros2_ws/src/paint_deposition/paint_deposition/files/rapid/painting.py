@@ -82,10 +82,10 @@ class Painting(Gun):
         self._fastest_mm_per_s = self.argument(i, 1)
 
     def do_pdispset(self, i: Instruction) -> None:
-        self._displacement = self._frame(i.values[0] if i.values else None)
+        given = i.values[0] if i.values else None
+        self._displacement = HOME if i.name == 'pdispoff' else self._frame(given)
 
-    def do_pdispoff(self, _: Instruction) -> None:
-        self._displacement = HOME
+    do_pdispoff = do_pdispset
 
     def do_waittime(self, i: Instruction) -> None:
         """Stand still, with the gun as it is."""

@@ -107,8 +107,7 @@ class _Builder(Transformer):
     def option(self, name: str, value: Any) -> dict[str, Any]:
         return {str(name): True if value is None else value}
 
-    def argument(self, *parts: Any) -> list:
-        return [*parts]
+    argument = items
 
     def arguments(self, *arguments: list | None) -> tuple[list, dict]:
         parts = [part for argument in arguments for part in argument or ()]
@@ -136,8 +135,7 @@ class _Builder(Transformer):
     def function(self, *parts: Any) -> Routine:
         return _routine(parts, False)
 
-    def trap(self, *parts: Any) -> Routine:
-        return _routine(parts, False)
+    trap = function
 
 
 def _routine(parts: tuple[Any, ...], is_procedure: bool) -> Routine:

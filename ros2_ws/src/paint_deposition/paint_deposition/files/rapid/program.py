@@ -19,9 +19,7 @@ LIST_OF_MODULES = '.pgf'
 
 
 def read_program(
-    path: Path | str,
-    gun_signal: str | None = None,
-    procedure: str | None = None,
+    path: Path | str, gun_signal: str | None = None, procedure: str | None = None
 ) -> RapidProgram:
     """Run a RAPID program, and read its moves.
 

@@ -163,6 +163,9 @@ class Unknown(NamedTuple):
 class Values:
     """The data of modules, and of the routine that runs."""
 
+    # Of the interpreter: run a routine with its values and options; the value that it returns.
+    call: Callable[[Routine, list, dict[str, Any]], Any]
+
     def __init__(self, modules: list[Module]) -> None:
         self.source, self.line = modules[0].source, 0
         self._local: dict[str, Datum] = {}
@@ -184,10 +187,6 @@ class Values:
     def fail(self, reason: str) -> NoReturn:
         """Refuse the program with the line that runs."""
         raise RecordingError(f'{self.source} line {self.line}: {reason}')
-
-    def call(self, routine: Routine, values: list, options: dict[str, Any]) -> Any:
-        """Run a routine; the value that it returns."""
-        raise NotImplementedError
 
     def routine(self, name: str) -> Routine | None:
         found = self._find(name)

@@ -122,15 +122,17 @@ def find_table(
     sheet: str = '',
     columns: int = 0,
     several: str = 'name one with sheet: ... in the campaign',
+    sheets: Sequence[Sheet] = (),
 ) -> tuple[Sheet, int | None]:
     """The sheet with a table, and the row of its headings; None where none is found.
 
     ``known`` counts the quantities that a row of headings names, 0 where a needed one is missing.
     ``sheet`` names a workbook's sheet; ``columns`` is how many a table without headings has at
-    least, 0 where that is not known; ``several`` what to do about tables in several sheets.
+    least, 0 where that is not known; ``several`` what to do about tables in several sheets;
+    ``sheets`` are those of the file where they are read already.
     Raises ``refusal`` for a file that cannot be read, or with tables in several sheets.
     """
-    sheets = read_sheets(path, refusal)
+    sheets = sheets or read_sheets(path, refusal)
     if sheet:
         named = [s for s in sheets if s.form == f"sheet '{sheet}'"]
         if not named:

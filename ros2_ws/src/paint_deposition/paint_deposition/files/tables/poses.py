@@ -20,6 +20,8 @@ from paint_deposition.files.tables.pose_columns import (
     read_rotations,
     translated,
 )
+from paint_deposition.files.tables.reading_columns import Layout, columns_of
+from paint_deposition.files.tables.sheets import read_sheets
 from paint_deposition.files.tables.table import SWITCHED
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
@@ -43,24 +45,29 @@ def is_pose_table(path: Path) -> bool:
     return path.suffix.lower() in SUFFIXES
 
 
-def may_hold_poses(path: Path) -> bool:
-    """Whether a table has a column of times, speeds or angles, as few tables of readings have."""
-    names = {*TIME, *SPEED, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW}
-    return _has(path, lambda columns: len(columns & names))
+def holds_readings(path: Path, points_given: bool) -> bool:
+    """Whether a table is one of gauge readings, and not of poses.
 
+    A quaternion is of poses. Else a table is of readings where a file of their points is given
+    or a column is known as the thickness, or where there is no column of times, speeds or angles,
+    as few tables of readings have.
+    """
+    sheets = read_sheets(path, RecordingError)
+    motion = {*TIME, *SPEED, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW}
 
-def holds_quaternions(path: Path) -> bool:
-    """Whether a table has the columns of a quaternion, as no table of readings has."""
-    return _has(path, lambda columns: int({*QUATERNION} <= columns or {*SCALAR_FIRST} <= columns))
+    def has(known: Callable[[list[Heading]], int]) -> bool:
+        return find_table(path, RecordingError, known, sheets=sheets)[1] is not None
 
+    def names(headings: list[Heading]) -> set[str]:
+        return {column_name(heading) for heading in translated(headings)}
 
-def _has(path: Path, count: Callable[[set[str]], int]) -> bool:
-    """Whether some headings of a table have columns that are counted."""
-
-    def known(headings: list[Heading]) -> int:
-        return count({column_name(heading) for heading in translated(headings)})
-
-    return find_table(path, RecordingError, known)[1] is not None
+    if has(lambda row: {*QUATERNION} <= names(row) or {*SCALAR_FIRST} <= names(row)):
+        return False
+    return (
+        points_given
+        or has(lambda row: len(at) if 'thickness' in (at := columns_of(row, Layout())) else 0)
+        or not has(lambda row: len(names(row) & motion))
+    )
 
 
 def read_pose_table(

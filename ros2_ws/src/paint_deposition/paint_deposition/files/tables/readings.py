@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -349,11 +350,6 @@ class ReadingTable(Table):
             )
 
 
-def holds_readings(path: Path) -> bool:
-    """Whether a file has a table in which a column is known as the thickness."""
-    return find_table(path, ReadingsError, _known(True, Layout()))[1] is not None
-
-
 def _known(films: bool, layout: Layout) -> Callable[[list[Heading]], int]:
     """What counts the quantities that headings name, 0 where a needed one is missing."""
     needed = (('thickness',),) if films else (AXES, ON_FACE)
@@ -374,7 +370,7 @@ def _rows_in(
     second table under other headings is refused; the same headings again are passed over.
     """
     known = _known(films, layout)
-    several = {} if films else {'several': 'save the one of the points by itself'}
+    several: dict[str, Any] = {} if films else {'several': 'save the one of the points by itself'}
     sheet, header = find_table(path, ReadingsError, known, layout.sheet, wide, **several)
     headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []
     if wide:

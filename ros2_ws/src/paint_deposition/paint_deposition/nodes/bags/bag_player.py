@@ -41,16 +41,11 @@ from paint_deposition.files.recordings.pose_topics import (
     read_frames,
 )
 from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
+from paint_deposition.nodes import topics
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed, requested
-from paint_deposition.nodes.runtime.topics import (
-    header,
-    header_stamp_ns,
-    pose_message,
-    unknown_state,
-)
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
+from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
+from paint_deposition.nodes.topics import header, header_stamp_ns, pose_message, unknown_state
 from paint_deposition.request import MotionOptions
 
 
@@ -234,9 +229,7 @@ class BagPlayer(PaintNode):
                     self._subscribers_to_await = 0  # when looping
                     self._time.change(started=True)
                 # Wait for the end of a pause, the time of the message, and the flow control.
-                while not self.stopped.is_set():
-                    if self._time.wait_for(message.log_time_ns, timeout_s=0.05):
-                        break
+                self._time.wait_for(message.log_time_ns, self.stopped)
                 if self.values['rate'] == 0.0:
                     self._flow_control.wait_for_room()
                     self._time.change(time_ns=message.log_time_ns)

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.nodes.runtime.topics import PROGRESS, PROGRESS_TOPIC, node_name
+from paint_deposition.nodes.topics import PROGRESS, PROGRESS_TOPIC, node_name
 
 LOG_PERIOD_S = 5.0
 ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
@@ -60,17 +60,11 @@ class ReplayClock:
             self._since_s = time.monotonic() if goes else None
             self._changed.notify_all()
 
-    def wait_for(self, time_ns: int, timeout_s: float) -> bool:
-        """Wait for that time, at rate 0 only for the end of a pause.
-
-        Returns:
-            False after the timeout.
-        """
+    def wait_for(self, time_ns: int, stopped: threading.Event) -> None:
+        """Wait for that time, at rate 0 only for the end of a pause; no longer once stopped."""
         with self._changed:
-            left_s = self._remaining_s(time_ns)
-            if left_s > 0.0:
-                self._changed.wait(min(left_s, timeout_s))
-            return self._remaining_s(time_ns) <= 0.0
+            while (left_s := self._remaining_s(time_ns)) > 0.0 and not stopped.is_set():
+                self._changed.wait(min(left_s, 0.05))
 
     def _remaining_s(self, time_ns: int) -> float:
         if self._rate == 0.0:

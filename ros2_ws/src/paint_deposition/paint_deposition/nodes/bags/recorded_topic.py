@@ -17,8 +17,8 @@ from rosbags.interfaces import (
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic
 from paint_deposition.files.recordings.messages import JOINT_TYPE, STATE_TYPE, TF_TYPES
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
-from paint_deposition.nodes.runtime.managed_node import MANAGED
-from paint_deposition.nodes.runtime.parameters import (
+from paint_deposition.nodes.managed_node import MANAGED
+from paint_deposition.nodes.parameters import (
     CONFIGURED,
     FILE_NAME,
     FILE_NAME_RULE,
@@ -26,7 +26,7 @@ from paint_deposition.nodes.runtime.parameters import (
     atomizers_parameter,
     fixed,
 )
-from paint_deposition.nodes.runtime.topics import (
+from paint_deposition.nodes.topics import (
     MOST_PUBLISHERS,
     TRUST_TOPIC,
     AdaptiveSubscription,

@@ -30,16 +30,10 @@ from paint_deposition.nodes.bags.recorded_topic import (
     bag_qos,
     default_topics,
 )
-from paint_deposition.nodes.runtime.managed_node import ManagedNode
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status, Task
-from paint_deposition.nodes.runtime.parameters import require_file_name
-from paint_deposition.nodes.runtime.topics import (
-    PART_TOPIC,
-    PROGRESS,
-    PROGRESS_TOPIC,
-    gun_topic,
-    header,
-)
+from paint_deposition.nodes.managed_node import ManagedNode
+from paint_deposition.nodes.node import ERROR, OK, WARN, Status, Task
+from paint_deposition.nodes.parameters import require_file_name
+from paint_deposition.nodes.topics import PART_TOPIC, PROGRESS, PROGRESS_TOPIC, gun_topic, header
 
 # The run of a part that has left takes what was sent for it until it has all, or none has come so
 # long: a message that got lost comes with the third next heartbeat of its writer at the latest.

@@ -19,9 +19,9 @@ from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trajectory import SPRAYS_NOTHING
 from paint_deposition.motion.transforms import NoTransform
-from paint_deposition.nodes.painting.frames import TfQueue, placed_in_order
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
+from paint_deposition.nodes import topics
+from paint_deposition.nodes.frames import TfQueue, placed_in_order
+from paint_deposition.nodes.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
 
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.painting_node import PaintingNode

@@ -9,26 +9,25 @@ from typing import Any
 from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 
+from paint_deposition.nodes.node import Task
 from paint_deposition.nodes.painting.film_display import (
     FilmDisplay,
-    shares,
+    laid_by_gun,
     statistics_of,
-    volume_by_gun,
 )
 from paint_deposition.nodes.painting.health import FilmTrust, painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
-from paint_deposition.nodes.runtime.node import Task
-from paint_deposition.nodes.runtime.parameters import (
+from paint_deposition.nodes.parameters import (
     CONFIGURED,
+    DISPLAY,
     NodeParameter,
-    display_parameters,
     fixed,
     require_display,
     require_file_name,
 )
-from paint_deposition.report.writers.write import write_film
+from paint_deposition.report.write import write_film
 
 
 class DepositionSimulator(PaintingNode):
@@ -50,7 +49,7 @@ class DepositionSimulator(PaintingNode):
             '[Hz]',
             (0.1, 30.0),
         ),
-        **display_parameters(),
+        **DISPLAY,
         **fixed(
             'its zones are found on the mesh once; clean the node up or restart it',
             CONFIGURED,
@@ -141,20 +140,15 @@ class DepositionSimulator(PaintingNode):
             details['part'] = part
 
         def write() -> list[Path]:
-            laid_cm3 = volume_by_gun(names, surface, film)
             details['atomizers'] = [
                 {
-                    'name': name,
-                    'model_file': file,
-                    'painted_volume_cm3': laid_cm3[name],
-                    'share': share,
-                    'emitted_volume_cm3': gun.used.emitted_cm3,
-                    'poses': poses,
+                    'name': name, 'model_file': file, 'painted_volume_cm3': laid_cm3,
+                    'share': share, 'emitted_volume_cm3': gun.used.emitted_cm3, 'poses': poses,
                 }
-                for (name, share), file, gun, poses in zip(
-                    shares(laid_cm3).items(), files, film.guns, counts, strict=True
+                for name, file, laid_cm3, share, gun, poses in zip(
+                    names, files, *laid_by_gun(surface, film), film.guns, counts, strict=True
                 )
-            ]
+            ]  # fmt: skip
             film_um = film.film_um
             figures = statistics_of(values, surface, film_um, film.used.emitted_cm3, zones)
             if any(gun.model.brushes for gun in film.guns):

@@ -3,7 +3,7 @@
 import sys
 import time
 from array import array
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -21,9 +21,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FIGURES, FilmStatistics, film_statistics
+from paint_deposition.nodes import topics
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.topics import ColouredMesh, gun_topic, header, white_marker
+from paint_deposition.nodes.topics import ColouredMesh, gun_topic, header, white_marker
 from paint_deposition.part.points import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
@@ -45,15 +45,11 @@ def statistics_of(
     return film_statistics(film_um, surface.vertex_areas_m2, emitted_cm3, zones=zones, **chosen)
 
 
-def volume_by_gun(guns: Sequence[str], surface: Surface, film: CommonFilm) -> dict[str, float]:
-    """Solids that each gun laid on the part, by its name [cm3]."""
-    return dict(zip(guns, film.laid_cm3(surface.vertex_areas_m2).tolist(), strict=True))
-
-
-def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
-    """Each gun's share of the paint on the part, 0 to 1; 0 for all without paint."""
-    total = sum(laid_cm3.values())
-    return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
+def laid_by_gun(surface: Surface, film: CommonFilm) -> tuple[list[float], list[float]]:
+    """Solids that each gun laid on the part [cm3], and its share, 0 to 1; 0 without any paint."""
+    laid_cm3 = film.laid_cm3(surface.vertex_areas_m2).tolist()
+    total = sum(laid_cm3)
+    return laid_cm3, [laid / total if total else 0.0 for laid in laid_cm3]
 
 
 def cloud_message(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
@@ -185,13 +181,13 @@ class FilmDisplay:
         figures = statistics_of(
             values, node.surface, self._film_um, film.used.emitted_cm3, node.zones
         )
-        laid_cm3 = volume_by_gun(node.gun_names, node.surface, film)
+        laid_cm3, shares = laid_by_gun(node.surface, film)
         self._stats = ThicknessStats(
             header=at,
             run=run,
-            atomizers=list(laid_cm3),
-            atomizer_volume_cm3=list(laid_cm3.values()),
-            atomizer_share=list(shares(laid_cm3).values()),
+            atomizers=node.gun_names,
+            atomizer_volume_cm3=laid_cm3,
+            atomizer_share=shares,
             **{name: getattr(figures, name) for name in FIGURES},
         )
         self._counts = None

@@ -11,6 +11,8 @@ from paint_msgs.msg import PoseProgress
 
 from paint_deposition.files.recordings.messages import STATE_TYPE, stamp_ns
 from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.nodes import topics
+from paint_deposition.nodes.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.painting.atomizer_input import (
     LONGEST_NAME,
     MOST_NAMES,
@@ -18,9 +20,7 @@ from paint_deposition.nodes.painting.atomizer_input import (
     AtomizerInput,
 )
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
-from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, gun_topic, node_name
+from paint_deposition.nodes.topics import PROGRESS_TOPIC, gun_topic, node_name
 
 # Without poses for so long, a gun that sprays is reported.
 SILENT_S = 2.0

@@ -17,15 +17,15 @@ from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.trajectory import BEFORE_ALL_NS
+from paint_deposition.nodes.frames import PartFrame
+from paint_deposition.nodes.managed_node import ManagedNode
+from paint_deposition.nodes.node import Task
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
-from paint_deposition.nodes.painting.frames import PartFrame
 from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
     models_from_parameters,
     read_part,
 )
-from paint_deposition.nodes.runtime.managed_node import ManagedNode
-from paint_deposition.nodes.runtime.node import Task
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, facing, toward_the_guns
 

@@ -16,8 +16,8 @@ from paint_deposition.files.model_file import LoadEffect, read_model
 from paint_deposition.film.common_film import LiveFilms, require_same_film_effects
 from paint_deposition.motion.pose_stream import DEFAULT_POSE_MEMORY
 from paint_deposition.motion.transforms import POSE_FORMAT, is_pose
-from paint_deposition.nodes.runtime.managed_node import MANAGED
-from paint_deposition.nodes.runtime.parameters import (
+from paint_deposition.nodes.managed_node import MANAGED
+from paint_deposition.nodes.parameters import (
     CONFIGURED,
     NodeParameter,
     atomizers_parameter,

@@ -19,11 +19,11 @@ from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
 from paint_deposition.film.integrator import NO_PAINT_UM
+from paint_deposition.nodes import topics
+from paint_deposition.nodes.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.painting.painting_parameters import PreparedPart
-from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
-from paint_deposition.nodes.runtime.parameters import require_file_name
-from paint_deposition.nodes.runtime.topics import header, state_message
+from paint_deposition.nodes.parameters import require_file_name
+from paint_deposition.nodes.topics import header, state_message
 
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Modules beside this one that register writers; those that import least come first.
-WRITERS = ('plans', 'inference')
+WRITERS = ('write_plans', 'write_inference')
 
 
 @singledispatch
@@ -85,9 +85,9 @@ def plot(result: Any, ax: 'Axes | None' = None) -> 'Axes':
     from paint_deposition.planning.faces import PartPlan
     from paint_deposition.planning.plan import Plan
     from paint_deposition.planning.recommendation import Recommendation
-    from paint_deposition.report.pictures.film import draw_film
-    from paint_deposition.report.pictures.planning import draw_curve
-    from paint_deposition.report.pictures.readings import draw_agreement, draw_points
+    from paint_deposition.report.film_pictures import draw_film
+    from paint_deposition.report.plan_pictures import draw_curve
+    from paint_deposition.report.readings_pictures import draw_agreement, draw_points
 
     if ax is None:
         from matplotlib import pyplot
@@ -144,8 +144,8 @@ def with_provenance(
 def _write_simulation(
     result: Film, folder: Path, made_from: Mapping[str, Any] | None = None, pictures: str = 'png'
 ) -> list[Path]:
-    from paint_deposition.report.pictures.film import film_picture
-    from paint_deposition.report.style import save_picture
+    from paint_deposition.report.drawing import save_picture
+    from paint_deposition.report.film_pictures import film_picture
 
     models = {gun.name or 'model': gun.model for gun in result.guns}
     motions = {f'{gun.name}: trajectory': gun.trajectory.source for gun in result.guns if gun.name}

@@ -23,8 +23,8 @@ from websockets.sync.server import serve
 from nodes.cell import parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
-from paint_deposition.nodes.robot.controllers import OpcuaSource, RwsSource
+from paint_deposition.nodes.atomizer_source import LATCHED_STATES
+from paint_deposition.nodes.controllers import OpcuaSource, RwsSource
 
 GUN, FLOW = 'EtherNetIP/Gun/doGun', 'EtherNetIP/Gun/aoFlow'
 EVENT = (

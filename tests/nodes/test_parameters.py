@@ -7,8 +7,8 @@ from rcl_interfaces.msg import ParameterType
 
 from nodes.cell import parameters
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.parameters import NodeParameter
+from paint_deposition.nodes.node import PaintNode
+from paint_deposition.nodes.parameters import NodeParameter
 from test_packaging import NODES, table_of
 
 TABLE = {

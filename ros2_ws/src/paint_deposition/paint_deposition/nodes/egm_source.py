@@ -12,9 +12,9 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
-from paint_deposition.nodes.runtime.topics import POSE_DEPTH, header, pose_message
+from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status
+from paint_deposition.nodes.parameters import NodeParameter, fixed
+from paint_deposition.nodes.topics import POSE_DEPTH, header, pose_message
 
 # What is read of EGM's messages: field, number and type of the wire format that ABB documents in
 # 3HAC073319 (EGM, sensor protocol); others are passed over.

@@ -6,8 +6,8 @@ from typing import Any
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.node import ERROR, OK, PaintNode, Status, Task
-from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTable, fixed
+from paint_deposition.nodes.node import ERROR, OK, PaintNode, Status, Task
+from paint_deposition.nodes.parameters import NodeParameter, ParameterTable, fixed
 
 MANAGED = fixed(
     'it is read when the node starts',

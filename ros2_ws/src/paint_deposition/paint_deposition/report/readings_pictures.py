@@ -15,26 +15,32 @@ from paint_deposition.inference.comparison.regions import interpolate_over_surfa
 from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.panel import PanelFit
-from paint_deposition.report.colour_scales import film_scale, residual_scale
-from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.film import page_film
-from paint_deposition.report.pictures.part import HALO, PALE_HALO, PartPicture, label_points
-from paint_deposition.report.style import (
+from paint_deposition.report.colour_scales import (
     ACCENT,
     BEFORE,
     COMPONENTS,
     INK,
-    MM,
     MUTED,
-    PAGE_IN,
-    TEXT_PT,
     TWO_SIDED_95,
+    film_scale,
+    residual_scale,
+)
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.drawing import (
+    HALO,
+    MM,
+    PAGE_IN,
+    PALE_HALO,
+    TEXT_PT,
+    PartPicture,
     colour_bar,
+    label_points,
     legend,
     new_figure,
     quiet,
     save_picture,
 )
+from paint_deposition.report.film_pictures import page_film
 
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
 # A profile's two charts with the room around them [in].
@@ -73,7 +79,6 @@ def residual_figures(data: ReportData, index: int, part: PartPicture) -> list[Fi
     surface, count = experiment.surface, len(experiment)
     points = experiment.points
     positions, normals = points.positions_m[:count], points.normals[:count]
-    room = 0.03 * (part.high_m - part.low_m).max()
     # Few readings beyond the end of the colours do not take the contrast from all others.
     largest = float(np.quantile(np.abs(np.concatenate(data.residuals_um)), 0.98))
     scale = residual_scale(largest)
@@ -81,7 +86,7 @@ def residual_figures(data: ReportData, index: int, part: PartPicture) -> list[Fi
     figures = []
     for name, residual_um in zip(data.model_names, data.residuals_um, strict=True):
         field = interpolate_over_surface(surface, positions, normals, residual_um[rows])
-        figure, axes = part.on_page(part.low_m - room, part.high_m + room, f'residual, {name}')
+        figure, axes = part.on_page(*part.window(), f'residual, {name}')
         part.draw(axes, scale.rgba(np.clip(field, -largest, largest), np.isfinite(field)))
         shown_um = np.clip(residual_um[rows], -largest, largest)
         colours = scale.rgba(shown_um, np.ones(count, dtype=bool)) / 255.0
@@ -272,7 +277,8 @@ def draw_agreement(
 def write_measuring_picture(path: str | Path, chosen: ChosenReadings) -> Path:
     """Draw the part with its numbered points, and how surely each effect would be found."""
     part = PartPicture.of(chosen.surface)
-    width, height = PART_IN * (part.high_m - part.low_m) / (part.high_m - part.low_m).max()
+    size_m = np.ptp(part.flat_m, axis=0)
+    width, height = PART_IN * size_m / size_m.max()
     bars = 4.3, 0.26 * len(chosen.power) + 1.2
     figure = new_figure(width + bars[0] + 0.8, max(height + 1.2, bars[1], 4.0))
     grid = GridSpec(1, 2, figure, width_ratios=[width, bars[0]])
@@ -297,8 +303,7 @@ def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = N
     """Draw the part, its film and its points on axes of your own, seen from the gun's side."""
     part = part or PartPicture.of(chosen.surface)
     scale = film_scale(chosen.film_um)
-    room = 0.03 * (part.high_m - part.low_m).max()
-    part.dress(axes, part.low_m - room, part.high_m + room)
+    part.dress(axes, *part.window())
     part.draw(axes, scale.rgba(chosen.film_um, chosen.film_um > NO_PAINT_UM))
     part.draw_contours(axes, chosen.film_um, scale.low, scale.high)
     places = part.view.flat(chosen.positions_m)
@@ -309,7 +314,7 @@ def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = N
             linestyle='', label=label,
         )  # fmt: skip
     names = [name.removeprefix('P').lstrip('0') for name in chosen.names]
-    per_m = 72.0 * PART_IN / (part.high_m - part.low_m).max()
+    per_m = 72.0 * PART_IN / np.ptp(part.flat_m, axis=0).max()
     label_points(axes, places, names, per_m, fontsize=8.5, color=INK, path_effects=PALE_HALO)
     axes.set_title(
         f'{len(chosen)} points for the gauge; lines: expected film [µm]', loc='left', fontsize=12,

@@ -19,10 +19,10 @@ from paint_deposition.files.recordings.messages import Signal, stamp_ns
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, is_pose
-from paint_deposition.nodes.robot.robot_poses import QUEUE_DEPTH, SILENT_S, JointPoses, TfPoses
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed, requested
-from paint_deposition.nodes.runtime.topics import (
+from paint_deposition.nodes.frames import QUEUE_DEPTH, SILENT_S, JointPoses, TfPoses
+from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status
+from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
+from paint_deposition.nodes.topics import (
     POSE_DEPTH,
     AdaptiveSubscription,
     header,

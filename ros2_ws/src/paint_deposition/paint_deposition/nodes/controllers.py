@@ -7,7 +7,7 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import timezone
 from types import SimpleNamespace
@@ -21,10 +21,10 @@ from paint_msgs.msg import AtomizerState
 
 from paint_deposition.errors import PaintError, quoted
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
-from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
-from paint_deposition.nodes.runtime.topics import header
+from paint_deposition.nodes.atomizer_source import LATCHED_STATES
+from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status
+from paint_deposition.nodes.parameters import NodeParameter, fixed
+from paint_deposition.nodes.topics import header
 
 TIMEOUT_S = 5.0
 POLL_S = 0.2
@@ -62,6 +62,8 @@ class SignalSource(PaintNode):
 
     PASSWORD: str  # the variable of the environment
     LIBRARY: str
+    # Connects and takes the signals until ``stopped``; errors are told, then retried.
+    follow: Callable[[], None]
 
     def __init__(self, **kwargs: Any):
         super().__init__(**kwargs)
@@ -99,10 +101,6 @@ class SignalSource(PaintNode):
             raise PaintError(
                 f'{self.get_name()}: {library} is not installed; run: pip install {library}'
             ) from None
-
-    def follow(self) -> None:
-        """Connect and ``take`` the signals until ``stopped``; errors are told, then retried."""
-        raise NotImplementedError
 
     def _keep_following(self) -> None:
         while not self.stopped.is_set():

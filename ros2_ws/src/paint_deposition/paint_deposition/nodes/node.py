@@ -30,7 +30,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError, quoted
-from paint_deposition.nodes.runtime.parameters import ParameterTable, declare_parameters
+from paint_deposition.nodes.parameters import ParameterTable, declare_parameters
 
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN

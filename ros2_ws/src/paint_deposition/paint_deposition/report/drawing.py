@@ -1,27 +1,39 @@
-"""A part as a flat picture from the side of the gun."""
+"""What all pictures share: figures and quiet axes, and a part as it is seen from the gun."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, TriMesh
-from matplotlib.figure import Figure
+from matplotlib.colorbar import Colorbar
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.text import Annotation
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 from scipy.spatial import cKDTree
 
+from paint_deposition.errors import PaintError
+from paint_deposition.files.atomic import replacing
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import coarse_faces, edges_of
 from paint_deposition.part.points import downhill_axis
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.report.style import INK, MUTED, PAGE_IN, TEXT_PT, new_figure
+from paint_deposition.report.colour_scales import BEFORE, GRID, INK, MUTED, TABLE, ColourScale
 
+DOTS_PER_INCH = 150
+# Pictures of a page are as wide as a phone or half a sheet of paper [in], so that their lettering
+# is that of the page.
+PAGE_IN, TEXT_PT = 3.8, 8.0
+MM = 1e3
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 # Where a label of a point may stand [pt], the best place first.
 AROUND_POINT = 9.0 * np.array(
@@ -107,23 +119,13 @@ class PartPicture:
         edges = edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
         return PartPicture(view, flat, faces, seen, flat[edges])
 
-    @property
-    def low_m(self) -> np.ndarray:
-        """(2,) lowest corner of the part in the picture [m]."""
-        return self.flat_m.min(axis=0)
-
-    @property
-    def high_m(self) -> np.ndarray:
-        """(2,) highest corner of the part in the picture [m]."""
-        return self.flat_m.max(axis=0)
-
-    def window(self, spray: SprayPath) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest corner of a picture of the part with its whole passes [m]."""
-        low, high = self.low_m, self.high_m
+    def window(self, spray: SprayPath | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest corner of a picture of the part, with its whole passes if any [m]."""
+        low, high = self.flat_m.min(axis=0), self.flat_m.max(axis=0)
         # Passes beside the part are shown as far off as the part is large.
         margin = (high - low).max()
-        gun = self.view.flat(spray.position_m[spray.flow > 0.0])
-        if len(gun):
+        if spray is not None and (spray.flow > 0.0).any():
+            gun = self.view.flat(spray.position_m[spray.flow > 0.0])
             low = np.maximum(np.minimum(low, gun.min(axis=0)), low - margin)
             high = np.minimum(np.maximum(high, gun.max(axis=0)), high + margin)
         room = 0.03 * (high - low).max()
@@ -277,3 +279,53 @@ def label_points(
             word, place / points_per_m, spot - place, textcoords='offset points', ha='center',
             va='center', **style,
         )  # fmt: skip
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure that draws into memory, without pyplot's global state."""
+    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout='constrained')
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def quiet(axes: Axes, x_label: str, y_label: str, title: str = '', size: float = 10.0) -> None:
+    """Thin grid, no box, labels in the muted colour and this size [pt]."""
+    axes.grid(True, color=GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[['top', 'right']].set_visible(False)
+    axes.spines[['left', 'bottom']].set_color(BEFORE)
+    axes.tick_params(colors=MUTED, labelsize=size - 1.0)
+    axes.set_xlabel(x_label, color=MUTED, fontsize=size)
+    axes.set_ylabel(y_label, color=MUTED, fontsize=size)
+    # A title that looks for its own height costs a third of the drawing.
+    axes.set_title(title, loc='left', fontsize=size + 1.0, color=INK, y=1.0)
+
+
+def legend(axes: Axes, **options: Any) -> None:
+    """A legend without a frame."""
+    axes.legend(frameon=False, fontsize=9, labelcolor=INK, **options)
+
+
+def colour_bar(
+    figure: FigureBase, axes: Sequence[Axes], label: str, scale: ColourScale, **place: Any
+) -> Colorbar:
+    """A bar of the colours beside all these axes; level and below them without a ``place``."""
+    palette = ListedColormap(scale.palette[:TABLE] / 255.0)
+    colours = ScalarMappable(Normalize(scale.low, scale.high), palette)
+    place = place or {'location': 'bottom', 'shrink': 0.6, 'aspect': 30, 'pad': 0.04}
+    bar = figure.colorbar(colours, ax=list(axes), **place)
+    bar.set_label(label, color=MUTED)
+    bar.ax.spines['outline'].set_visible(False)
+    return bar
+
+
+def save_picture(figure: Figure, path: str | Path) -> Path:
+    """Write the figure as PNG, SVG or PDF, by the suffix, replacing an older file at once."""
+    path = Path(path)
+    if path.suffix not in ('.png', '.svg', '.pdf'):
+        raise PaintError(f'{path}: give a picture a name that ends in .png, .svg or .pdf')
+    with replacing(path) as temporary:
+        figure.savefig(
+            temporary, format=path.suffix.removeprefix('.'), dpi=DOTS_PER_INCH, facecolor='white'
+        )
+    return path

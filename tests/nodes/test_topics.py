@@ -7,8 +7,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.topics import ColouredMesh, header, white_marker
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
+from paint_deposition.nodes.topics import ColouredMesh, header, white_marker
 from paint_deposition.report.colour_scales import FILM_PALETTE
 
 STAMPS_NS = 0, 1_758_000_123_456_789_012

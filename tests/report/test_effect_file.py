@@ -22,14 +22,14 @@ from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.kernel.eq2_flux import Ray
 from paint_deposition.model.eq2_projection import Projection
-from paint_deposition.report.writers.inference import (
+from paint_deposition.report.write import write_film
+from paint_deposition.report.write_inference import (
     effect_entry,
     file_name,
     write_effect_file,
     write_fitted,
 )
-from paint_deposition.report.writers.plans import gauge_turns
-from paint_deposition.report.writers.write import write_film
+from paint_deposition.report.write_plans import gauge_turns
 from small_campaign import small_campaign
 
 KNOTS, SD = 12, 0.02

@@ -17,9 +17,9 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.motion.transforms import Rigid
-from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
-from paint_deposition.nodes.robot.robot_poses import JointPoses
-from paint_deposition.nodes.runtime.node import ERROR
+from paint_deposition.nodes.atomizer_source import AtomizerSource
+from paint_deposition.nodes.frames import JointPoses
+from paint_deposition.nodes.node import ERROR
 from robot_arm import JOINTS, URDF, tip_poses
 
 WAY = np.linspace([0.1, -0.2, 0.3, 0.0, 0.2, -0.1], [0.4, 0.1, 0.1, 0.3, -0.2, 0.5], 40)

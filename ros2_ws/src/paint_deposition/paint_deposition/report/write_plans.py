@@ -37,16 +37,16 @@ from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.film import film_picture
-from paint_deposition.report.pictures.planning import (
+from paint_deposition.report.drawing import save_picture
+from paint_deposition.report.film_pictures import film_picture
+from paint_deposition.report.plan_pictures import (
     write_geometry_picture,
     write_improvement_picture,
     write_places,
     write_uniformity,
 )
-from paint_deposition.report.pictures.readings import write_measuring_picture
-from paint_deposition.report.style import save_picture
-from paint_deposition.report.writers.write import input_files, with_provenance, write_film, written
+from paint_deposition.report.readings_pictures import write_measuring_picture
+from paint_deposition.report.write import input_files, with_provenance, write_film, written
 
 BAG, TABLE, PROGRAM, JOINTS = 'trajectory', 'passes.csv', 'passes.mod', 'joints.csv'
 

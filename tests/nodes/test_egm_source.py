@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.nodes.robot.egm_source import EgmSource, EgmStream
+from paint_deposition.nodes.egm_source import EgmSource, EgmStream
 
 MM = (812.5, -240.25, 955.0)
 WXYZ = (0.5, 0.5, -0.5, 0.5)

@@ -12,7 +12,7 @@ from nodes.cell import START_NS, Broadcaster, parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.motion.transforms import Rigid
-from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
+from paint_deposition.nodes.atomizer_source import AtomizerSource
 
 needs_tf = pytest.mark.skipif(
     importlib.util.find_spec('tf2_msgs') is None, reason='tf2 comes with a ROS installation'

@@ -147,20 +147,18 @@ def requested(
     return NodeParameter(default, f'{text} [{unit}]', bounds)
 
 
-def display_parameters() -> dict[str, NodeParameter]:
-    """The rows that say how a film is shown, and what film is wanted."""
-    described = {
-        'color_min_um': 'Film at the lower end of the colours; both ends 0: automatic',
-        'color_max_um': 'Film at the upper end of the colours; both ends 0: automatic',
-        'painted_above_um': 'Thinner film counts, and is shown, as bare metal',
-        'target_um': 'Film wanted; 0: none',
-        'target_tolerance_um': 'Allowed difference from the target',
-    }
-    defaults = {'painted_above_um': DEFAULT_PAINTED_ABOVE_UM}
-    return {
-        name: NodeParameter(defaults.get(name, 0.0), f'{text} [µm]', (0.0, 10_000.0))
-        for name, text in described.items()
-    }
+# The rows that say how a film is shown, and what film is wanted.
+DISPLAY: ParameterTable = {
+    name: NodeParameter(default, f'{text} [µm]', (0.0, 10_000.0))
+    for name, default, text in (
+        ('color_min_um', 0.0, 'Film at the lower end of the colours; both ends 0: automatic'),
+        ('color_max_um', 0.0, 'Film at the upper end of the colours; both ends 0: automatic'),
+        ('painted_above_um', DEFAULT_PAINTED_ABOVE_UM,
+         'Thinner film counts, and is shown, as bare metal'),
+        ('target_um', 0.0, 'Film wanted; 0: none'),
+        ('target_tolerance_um', 0.0, 'Allowed difference from the target'),
+    )
+}  # fmt: skip
 
 
 def require_display(values: Mapping[str, Any]) -> None:

@@ -21,23 +21,31 @@ from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.programme import STANDING_M, speed_along
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
-from paint_deposition.report.pictures.film import draw_tool_path, page_film
-from paint_deposition.report.pictures.part import PartPicture, View, draw_triangles, dress
-from paint_deposition.report.style import (
+from paint_deposition.report.colour_scales import (
     ACCENT,
     BEFORE,
     COMPONENTS,
     GRID,
     INK,
-    MM,
     MUTED,
+    OVER_RGB,
+    UNDER_RGB,
+    ColourScale,
+    film_scale,
+)
+from paint_deposition.report.drawing import (
+    MM,
+    PartPicture,
+    View,
     colour_bar,
+    draw_triangles,
+    dress,
     legend,
     new_figure,
     quiet,
     save_picture,
 )
+from paint_deposition.report.film_pictures import draw_tool_path, page_film
 
 CHOSEN = '#c0392b'
 PART_COLOUR = '#b8c2cc'

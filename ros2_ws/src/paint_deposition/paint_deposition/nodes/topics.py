@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Point, PoseStamped, Vector3
 from paint_msgs.msg import AtomizerState
-from rclpy.callback_groups import CallbackGroup
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -58,17 +58,11 @@ def node_name(info: TopicEndpointInfo) -> str:
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
 
 
-class PolledCallbackGroup(CallbackGroup):
+class PolledCallbackGroup(MutuallyExclusiveCallbackGroup):
     """A callback group that never runs: its subscriptions are polled and do not wake the node."""
 
     def can_execute(self, _entity: Any) -> bool:
         return False
-
-    def beginning_execution(self, _entity: Any) -> bool:
-        return False
-
-    def ending_execution(self, _entity: Any) -> None:
-        """Nothing is ever executed."""
 
 
 class AdaptiveSubscription:

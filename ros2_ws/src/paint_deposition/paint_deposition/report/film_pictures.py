@@ -15,9 +15,7 @@ from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics, wanted_a
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.report.colour_scales import BARE_RGB, ColourScale, film_scale
-from paint_deposition.report.pictures.part import HALO, PartPicture, View
-from paint_deposition.report.style import (
+from paint_deposition.report.colour_scales import (
     BARE,
     BELOW,
     GRID,
@@ -25,8 +23,14 @@ from paint_deposition.report.style import (
     INK,
     MUTED,
     WITHIN,
+    ColourScale,
+    film_scale,
+)
+from paint_deposition.report.drawing import (
+    HALO,
+    PartPicture,
+    View,
     colour_bar,
-    colours_of,
     new_figure,
     quiet,
 )
@@ -56,15 +60,12 @@ def film_picture(
     grid = figure.add_gridspec(rows, 2, width_ratios=[width, beside])
     axes = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
     scale = draw_film(axes[-1], surface, film_um, spray, statistics.painted_above_um, part)
-    bar = figure.colorbar(colours_of(scale), ax=axes[-1], aspect=25, pad=0.02)
-    bar.set_label('film [µm]', color=MUTED)
+    bar = colour_bar(figure, axes[-1:], 'film [µm]', scale, aspect=25, pad=0.02)
     bar.ax.tick_params(colors=MUTED, labelsize=9)
-    bar.ax.spines['outline'].set_visible(False)
     s, figures = statistics, figure.add_subplot(grid[rows - 1, 1])
     figures.set_axis_off()
     if np.any(film_um <= s.painted_above_um):
-        colour = '#{:02x}{:02x}{:02x}'.format(*BARE_RGB)
-        _draw_patches(figures, [(colour, f'up to {s.painted_above_um:g} µm')])
+        _draw_patches(figures, [(BARE, f'up to {s.painted_above_um:g} µm')])
     _write(
         figures,
         f'mean {s.mean_um:.1f} µm, standard deviation {s.std_dev_um:.1f} µm\n'
@@ -206,11 +207,7 @@ def _write(axes: Axes, text: str, size: float = 9.5) -> None:
 
 
 def _draw_histogram(
-    axes: Axes,
-    surface: Surface,
-    film_um: np.ndarray,
-    s: FilmStatistics,
-    zones: PointZones | None,
+    axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmStatistics, zones: PointZones | None
 ) -> None:
     """Area over film, of zones in tolerances from their targets, with the band behind it."""
     painted, shown = film_um > s.painted_above_um, film_um

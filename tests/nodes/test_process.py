@@ -14,8 +14,8 @@ NODE = """
 import os, signal, sys, time
 from pathlib import Path
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.parameters import NodeParameter
-from paint_deposition.nodes.runtime.node import PaintNode, run_node
+from paint_deposition.nodes.parameters import NodeParameter
+from paint_deposition.nodes.node import PaintNode, run_node
 
 
 class Worker(PaintNode):

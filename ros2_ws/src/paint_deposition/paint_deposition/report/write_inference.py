@@ -31,13 +31,10 @@ from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData, history_as_list
+from paint_deposition.report.drawing import save_picture
 from paint_deposition.report.page import report_html
-from paint_deposition.report.pictures.readings import (
-    comparison_figure,
-    write_calibration_pictures,
-)
-from paint_deposition.report.style import save_picture
-from paint_deposition.report.writers.write import written
+from paint_deposition.report.readings_pictures import comparison_figure, write_calibration_pictures
+from paint_deposition.report.write import written
 
 # What a law is over, in the words of an effect's code, and the family of such effects.
 VARIABLES = {

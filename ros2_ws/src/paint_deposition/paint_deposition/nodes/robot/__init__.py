@@ -1,1 +1,0 @@
-"""The poses and signals of a robot's gun, published as `atomizer/pose` and `atomizer/state`."""

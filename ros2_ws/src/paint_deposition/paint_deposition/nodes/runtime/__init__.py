@@ -1,1 +1,0 @@
-"""The base of every node: process, parameters, quality of service, diagnostics."""

@@ -1,1 +1,0 @@
-"""Pictures for paper and web, drawn with matplotlib."""
