@@ -25,9 +25,7 @@ def planar_flux(p: Pattern, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return p.K1_cm3_per_s * ((1 - p.K2) * f * g1 + p.K2 * g2)
 
 
-def film_um(
-    p: Pattern, motion: Motion, points_m: np.ndarray, normals: np.ndarray, step_s: float = 0.01
-) -> np.ndarray:
+def film_um(p: Pattern, motion: Motion, points_m, normals, step_s: float = 0.01) -> np.ndarray:
     """Eq. (2) summed over the time the trigger is on."""
     film = np.zeros(len(points_m))
     for on, off in motion.trigger_s.reshape(-1, 2):

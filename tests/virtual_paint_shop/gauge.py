@@ -9,6 +9,9 @@ from scipy.stats import qmc
 
 from .doors import Part
 
+# Of readings from free edges.
+KEEP_OFF_M = 0.015
+
 
 @dataclass(frozen=True)
 class GaugeNoise:
@@ -84,17 +87,14 @@ class Readings:
         return Readings(*(column[rows] for column in vars(self).values()))
 
 
-def layout(
-    part: Part, style: str, readings: int, repeats: int, rng: np.random.Generator,
-    keep_off_m: float = 0.015,
-) -> Spots:  # fmt: skip
+def layout(part: Part, style: str, readings: int, repeats: int, rng: np.random.Generator) -> Spots:
     """`readings` in all, of which `repeats` are second and third visits to some of the points."""
     points = max(readings - repeats, 3)
     if style == 'random':
-        x, z = scatter(part, points, rng, keep_off_m)
+        x, z = scatter(part, points, rng, KEEP_OFF_M)
         group = np.full(x.size, '')
     else:
-        x, z, group = _lines(part, style, points, rng, keep_off_m)
+        x, z, group = _lines(part, style, points, rng)
     times = np.ones(x.size, int)
     again = rng.permutation(x.size)[: max(int(np.ceil(repeats / 2)), 1)]
     for n in range(repeats):
@@ -174,7 +174,7 @@ def keep_clear(part: Part, spots: Spots) -> Spots:
 
 
 def _lines(
-    part: Part, style: str, points: int, rng: np.random.Generator, keep_off_m: float
+    part: Part, style: str, points: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Four or five columns, or five to seven rows, as one tapes them on a door."""
     lines = int(rng.integers(4, 6)) if style == 'columns' else int(rng.integers(5, 8))
@@ -183,7 +183,7 @@ def _lines(
     across = np.linspace(0.08, 0.92, lines)[number]
     each = np.bincount(number, minlength=lines)[number]
     share = place / np.maximum(each - 1, 1)
-    room = keep_off_m + 0.001
+    room = KEEP_OFF_M + 0.001
     name, aside, up = ('column', across, share) if style == 'columns' else ('row', share, across)
     z = room + up * (part.height_m - 2 * room)
     x = part.left(z) + room + aside * (0.5 * part.width_m - part.left(z) - 2 * room)

@@ -98,26 +98,17 @@ class Truth:
         """Share of each landing that stays (may exceed 1: paint that would have been lost)."""
         return 1.0
 
-    def on_film(
-        self, film_um: np.ndarray, x: np.ndarray, z: np.ndarray, scene: Scene, film_at: Callable
-    ) -> np.ndarray:
+    def on_film(self, film_um: np.ndarray, x, z, scene: Scene, film_at: Callable) -> np.ndarray:
         """film_at(x, z) -> film of the parcels at any points of the part."""
         return film_um
 
-    def on_gauge(
-        self, film_um: np.ndarray, x: np.ndarray, z: np.ndarray, scene: Scene
-    ) -> np.ndarray:
+    def on_gauge(self, film_um: np.ndarray, x, z, scene: Scene) -> np.ndarray:
         return film_um
 
     def as_dict(self) -> dict:
-        return {
-            'id': self.id,
-            'form': self.form,
-            'family': self.family,
-            'amplitude': float(self.amplitude),
-            'unit': self.unit,
-            **{k: plain(v) for k, v in self.drawn.items()},
-        }
+        kind = {'id': self.id, 'form': self.form, 'family': self.family}
+        amount = {'amplitude': float(self.amplitude), 'unit': self.unit}
+        return kind | amount | plain(self.drawn)
 
 
 def changes_flight(truth: Truth) -> bool:
@@ -157,20 +148,16 @@ def library() -> dict[str, type[Truth]]:
 
 
 def choose(
-    spec: str | list[str] | None,
-    rng: np.random.Generator,
-    amplitude: float | dict | None = None,
-    scale: float = 1.0,
-) -> list[Truth]:
-    """Truths named by `spec`: None, 'air_drift', 'air_drift+sag~yield', 'unknown:*', a list."""
+    spec: str | list[str] | None, rng: np.random.Generator,
+    amplitude: float | dict | None = None, scale: float = 1.0,
+) -> list[Truth]:  # fmt: skip
+    """Truths named by `spec`: None, 'air_drift', 'air_drift+sag~yield', a list."""
     if spec is None or spec == 'clean':
         return []
     known = library()
     names = spec.split('+') if isinstance(spec, str) else list(spec)
     truths = []
     for name in names:
-        if name.endswith('*'):
-            name = str(rng.choice(sorted(k for k in known if k.startswith(name[:-1]))))
         if name not in known:
             raise ValueError(f'no truth {name!r}; there are: {", ".join(sorted(known))}')
         wanted = amplitude.get(name) if isinstance(amplitude, dict) else amplitude

@@ -20,15 +20,10 @@ from paint_deposition.motion.part_frame import Rigid
 
 
 def same(read: pd.Trajectory, written: pd.Trajectory) -> bool:
+    poses, trigger = ('stamps_ns', 'positions_m', 'quaternions_xyzw'), ('stamps_ns', 'flow')
     return read.frame_id == written.frame_id and all(
         np.array_equal(getattr(read, name), getattr(written, name))
-        for name in (
-            'stamps_ns',
-            'positions_m',
-            'quaternions_xyzw',
-            'trigger_stamps_ns',
-            'trigger_flow',
-        )
+        for name in (*poses, *(f'trigger_{name}' for name in trigger))
     )
 
 
@@ -50,12 +45,15 @@ def test_every_storage_and_spelling_of_the_topic(tmp_path, storage):
         assert same(pd.read_recording(path, topic), written)
 
 
-def test_a_topic_without_poses_is_no_candidate(tmp_path):
-    written = straight_pass(triggers=False)
+def test_topics_of_other_types_and_without_messages_are_no_candidates(tmp_path):
+    """rosbags cannot parse the events' type; only the types that are read have to be parsed."""
+    written, messages = straight_pass(triggers=False), Messages()
+    event = Definition('MSG: example_interfaces/srv/AddTwoInts_Event\nint64 a\n---\nint64 sum\n')
     with RunWriter(tmp_path / 'run') as run:
+        run.add_topic(RunTopic('/add/_service_event', 'example_interfaces/srv/Add_Event', event))
+        run.write('/add/_service_event', b'\0\1\0\0', START_NS, START_NS)
         for topic in ('/empty', '/p'):
             run.add_topic(RunTopic(topic, POSE, standard(POSE)))
-        messages = Messages()
         for topic, stamp, message in pose_entries(written, '/p'):
             run.write(topic, bytes(messages.serialised(message)), stamp, stamp)
     assert same(pd.read_recording(tmp_path / 'run'), written)
@@ -64,13 +62,12 @@ def test_a_topic_without_poses_is_no_candidate(tmp_path):
 def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     written, messages = straight_pass(triggers=False), Messages()
     entries = pose_entries(written, delay_ns=3_000_000)
-    entries += [('/gun', START_NS + 700, messages.trigger(True))]
-    entries += [('/gun', START_NS + 900, messages.trigger(False))]
+    entries += [('/gun', START_NS + at, messages.trigger(at == 700)) for at in (700, 900)]
     # Logged late: only its own stamp says when the flow changed.
-    entries += [('/state', START_NS + 5_000, messages.state(START_NS + 70, True, 0.8, 60.0))]
-    entries += [('/state', START_NS + 5_001, messages.state(START_NS + 90, False, 0.8))]
+    states = [(70, True, 0.8, 60.0), (90, False, 0.8), (95, True, np.nan, 64.0)]
     entries += [
-        ('/state', START_NS + 5_002, messages.state(START_NS + 95, True, float('nan'), 64.0))
+        ('/state', START_NS + 5_000 + k, messages.state(START_NS + at, *state))
+        for k, (at, *state) in enumerate(states)
     ]
     folder = write_bag(tmp_path / 'two_triggers', sorted(entries, key=lambda entry: entry[1]))
     gun = pd.read_recording(folder, None, 'gun')
@@ -145,20 +142,6 @@ def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
 )
 def test_what_real_bags_do_not_have(shared_data, bag, arguments, says):
     assert re.search(says, refusal(shared_data / 'bags' / bag, *arguments))
-
-
-def test_poses_beside_service_events_are_read(tmp_path):
-    """rosbags cannot parse the events' type; only the types that are read have to be parsed."""
-    written = straight_pass(triggers=False)
-    folder = write_pose_bag(tmp_path / 'pass', written)
-    event = Definition('MSG: example_interfaces/srv/AddTwoInts_Event\nint64 a\n---\nint64 sum\n')
-    with open_bag(folder) as bag, RunWriter(tmp_path / 'mixed') as run:
-        run.add_topic(RunTopic('/add/_service_event', 'example_interfaces/srv/Add_Event', event))
-        run.add_topic(RunTopic('/p', POSE, standard(POSE)))
-        run.write('/add/_service_event', b'\0\1\0\0', START_NS, START_NS)
-        for message in bag.messages():
-            run.write('/p', message.cdr, message.log_time_ns, message.log_time_ns)
-    assert same(pd.read_recording(tmp_path / 'mixed'), written)
 
 
 def test_messages_that_nodes_leave_out_are_left_out_counted_and_refused_if_strict(tmp_path):

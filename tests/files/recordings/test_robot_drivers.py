@@ -73,11 +73,8 @@ def poses(topic, kind, scale=1.0, frame_id='base_link'):
 
 def bag(path, *streams):
     messages = Messages()
-    entries = [
-        (topic, stamp + LAG_NS, message)
-        for stream in streams
-        for topic, stamp, message in stream(messages)
-    ]
+    rows = (row for stream in streams for row in stream(messages))
+    entries = [(topic, stamp + LAG_NS, message) for topic, stamp, message in rows]
     return write_bag(path, sorted(entries, key=lambda entry: entry[1]), 'mcap', messages)
 
 
@@ -162,17 +159,13 @@ def test_each_driver_gives_the_motion_of_the_arm(driver, tmp_path):
 @pytest.mark.parametrize(
     ('stream', 'words'),
     [
-        (
-            joints('/rws', ABB_JOINTS, SWEEP, every=50),
-            '/rws: only 5 samples a second: .* 20 cm at 1 m/s, .* polling_rate',
-        ),
-        (
-            joints('/rws', ABB_JOINTS, SWEEP, times=3),
-            '/rws: 480 of 751 samples repeat .* dropped, and 83.3 a second',
-        ),
+        (joints('/rws', ABB_JOINTS, SWEEP, every=50),
+         '/rws: only 5 samples a second: .* 20 cm at 1 m/s, .* polling_rate'),
+        (joints('/rws', ABB_JOINTS, SWEEP, times=3),
+         '/rws: 480 of 751 samples repeat .* dropped, and 83.3 a second'),
         (MILLIMETRES, '/arm_PoseStamped: its positions reach 1277 .* give --pose-unit mm'),
     ],
-)
+)  # fmt: skip
 def test_what_was_taken_in_silence_is_told(stream, words, tmp_path):
     given = {} if stream is MILLIMETRES else {'urdf': str(ROBOTS / 'arm.urdf')}
     read = pd.read_recording(bag(tmp_path / 'run', stream), **given)
