@@ -114,15 +114,15 @@ def shape(name: str, low: str) -> str:
         ([('return exp', "return open('x').read() + exp")], 'flux_factor that does not compile'),
         ([('return exp', 'return -exp')], 'a factor is 0 or more'),
         ([('return exp', 'retrun exp')], 'SyntaxError'),
+        ([('speed_m_per_s)\n', 'speed_m_per_s)\n\n\nclass Other(WakeLoss):\n    id = "other"\n')],
+         'has several effects (WakeLoss, Other)'),
         ([('kernel.fast_math', 'kernel.fast_maths')], 'line 7: ModuleNotFoundError'),
         # Its other places are tried out.
-        (with_place('on_film(self, film_um, points)', 'return film_um[:2]'),
-         'not return a finite film'),
+        (film('return film_um[:2]'), 'not return a finite film'),
         (with_place('on_gauge(self, film_um, points)', 'return film_um / 0.0 * 0.0'),
          'not return a finite'),
-        (with_place('on_film(self, film_um, points)', 'return points.no_such'),
-         'fails (AttributeError'),
-        (with_place('on_path(self, path, context)', 'return None'), 'return path.with_(...)'),
+        (film('return points.no_such'), 'fails (AttributeError'),
+        (along('return None'), 'return path.with_(...)'),
         (film('film_um += 1.0; return film_um'), 'has an on_film that changes what it is given'),
         (film('return film_um.tolist()'), 'return an array with one finite number a point'),
         (film('return film_um + (film_um > 9.0) * points.edge_distance_m'),
@@ -164,13 +164,6 @@ def test_what_is_wrong_is_said_in_one_line_with_its_remedy(own, changes, message
     assert '\n' not in str(refused.value)
 
 
-def test_two_effects_in_a_file_are_refused(own):
-    path = own()
-    path.write_text(SAMPLE + '\n\nclass Other(WakeLoss):\n    id = "other"\n')
-    with pytest.raises(ModelError, match=r'has several effects \(WakeLoss, Other\)'):
-        load_effect_file(path)
-
-
 def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
     text = (repository / 'docs/own_effect.md').read_text(encoding='utf-8')
     assert (SAMPLES / 'my_effect.py').relative_to(repository).as_posix() in text
@@ -179,13 +172,8 @@ def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
     for place in (*PLACES, 'widening'):
         assert f'`{place}(' in text
         assert hasattr(Effect, place)
-    context = (*(field.name for field in fields(PathContext)), 'downhill', 'across')
-    for name in (
-        *(field.name for field in fields(SprayPath)),
-        *context,
-        'slope_per_m',
-        *NEEDS[1:],
-    ):
+    columns = (field.name for of in (SprayPath, PathContext) for field in fields(of))
+    for name in (*columns, 'downhill', 'across', 'slope_per_m', *NEEDS[1:]):
         assert f'`{name}`' in text or f"`'{name}'`" in text or f"'{name}'`" in text
 
 

@@ -55,9 +55,8 @@ def test_dried_coats_sag_each_by_itself_and_wet_ones_as_one(panel):
     plain, once = (pd.simulate(panel, BASE, model).film_um for model in (PLAIN, SAGGING))
     run_um = once - plain
     for wet_on_wet, times in ((False, 2.0), (True, 8.0)):
-        film = pd.simulate(
-            panel, [BASE, BASE], SAGGING, coats=['base', 'clear'], wet_on_wet=wet_on_wet
-        )
+        coats = {'coats': ['base', 'clear'], 'wet_on_wet': wet_on_wet}
+        film = pd.simulate(panel, [BASE, BASE], SAGGING, **coats)
         assert film.film_um - 2.0 * plain == pytest.approx(times * run_um, abs=1e-9)
         assert np.array_equal(film.coats[0].film_um, once)
         added = sum(coat.film_um for coat in film.coats)

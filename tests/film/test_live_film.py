@@ -34,6 +34,16 @@ TRIGGERS = {
 }
 
 
+def change(time_s: float, flow: float) -> TriggerChange:
+    return TriggerChange(int(stamps_ns(time_s)), flow)
+
+
+def part_of(motion, first: int, **told):
+    """From this pose on, with what else is told of it."""
+    columns = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
+    return replace(motion, **{name: getattr(motion, name)[first:] for name in columns} | told)
+
+
 def followed(coming, model=MODEL, **options):
     film = LiveFilm(lying_plane(), model, **options)
     film.replay(coming)
@@ -98,27 +108,24 @@ def test_the_first_state_takes_back_what_was_painted_before_it():
 def test_changes_that_come_out_of_order_leave_the_newest_in_force():
     motion = straight_pass(TIMES_S)
     film = LiveFilm(lying_plane(), MODEL)
-    for time_s, flow in ((0.0, 1.0), (3.0, 0.0), (1.0, 0.8), (2.0, 0.6), (0.5, 0.9)):
-        film.add_trigger(TriggerChange(int(stamps_ns([time_s])[0]), flow))
+    for told in ((0.0, 1.0), (3.0, 0.0), (1.0, 0.8), (2.0, 0.6), (0.5, 0.9)):
+        film.add_trigger(change(*told))
     for upto, flow in ((200, 0.9), (300, 0.8), (600, 0.6), (1000, 0.0)):
         film.add_poses(poses(motion, slice(upto - 100, upto)))
         assert film.flow == flow
-    film.add_trigger(TriggerChange(int(stamps_ns([3.5])[0]), 0.7))
+    film.add_trigger(change(3.5, 0.7))
     # Late: an earlier change than the one in force leaves that one in force.
-    film.add_trigger(TriggerChange(int(stamps_ns([3.2])[0]), 0.5))
+    film.add_trigger(change(3.2, 0.5))
     assert film.flow == 0.7
 
 
 def test_states_after_a_clock_was_set_back_count_though_the_film_is_reset_before_their_poses():
     """All of them, also one that comes with poses that may yet be stragglers."""
-    motion = straight_pass(TIMES_S)
-    back_ns = 3_600_000_000_000
-    again = replace(motion, stamps_ns=motion.stamps_ns - back_ns)
+    motion, back_s = straight_pass(TIMES_S), 3600.0
+    again = replace(motion, stamps_ns=motion.stamps_ns - round(1e9 * back_s))
     film = followed([TriggerChange(START_NS, 1.0), poses(motion, slice(0, 500))])
     states = [(0.0, 1.0), (0.8, 0.0), (1.2, 0.5)]
-    first, second, third = (
-        TriggerChange(int(stamps_ns([at_s])[0]) - back_ns, flow) for at_s, flow in states
-    )
+    first, second, third = (change(at_s - back_s, flow) for at_s, flow in states)
     film.replay([first, second, poses(again, slice(0, 20)), third])
     film.reset()
     film.add_poses(poses(again, slice(20, None)))
@@ -138,11 +145,8 @@ def test_a_state_that_is_told_ahead_holds_though_the_film_is_reset_before_its_po
     nowhen = poses(motion, slice(before, before + 1))
     film.add_poses(replace(nowhen, stamps_ns=np.zeros(1, np.int64)))
     film.add_poses(poses(motion, slice(before, None)))
-    rest = replace(
-        motion, stamps_ns=motion.stamps_ns[before:], positions_m=motion.positions_m[before:],
-        quaternions_xyzw=motion.quaternions_xyzw[before:],
-    )  # fmt: skip
-    assert np.array_equal(film.snapshot().film_um, painted(lying_plane(), rest).film_um)
+    rest = painted(lying_plane(), part_of(motion, before))
+    assert np.array_equal(film.snapshot().film_um, rest.film_um)
 
 
 def test_the_log_paints_the_motion_again_with_another_model():
@@ -150,17 +154,14 @@ def test_the_log_paints_the_motion_again_with_another_model():
     film = followed(events(motion, 10, delay_s=0.05))
     again = LiveFilm(lying_plane(), LAGGING)
     again.replay(film.log.events())
-    assert np.array_equal(
-        again.snapshot().film_um, painted(lying_plane(), motion, LAGGING).film_um
-    )
+    offline = painted(lying_plane(), motion, LAGGING)
+    assert np.array_equal(again.snapshot().film_um, offline.film_um)
     assert again.counts == film.counts
 
 
 def test_another_model_from_here_on_leaves_the_film_so_far():
     motion = straight_pass(TIMES_S)
-    doubled = MODEL.model_copy(
-        update={'planar': MODEL.planar.model_copy(update={'K1_cm3_per_s': 3.8})}
-    )
+    doubled = MODEL.with_patterns([MODEL.planar.model_copy(update={'K1_cm3_per_s': 3.8})])
     film = LiveFilm(lying_plane(), MODEL, trigger_latency_s=0.0)
     film.add_poses(poses(motion, slice(0, 501)))
     before = film.snapshot().film_um
@@ -168,9 +169,8 @@ def test_another_model_from_here_on_leaves_the_film_so_far():
     assert np.allclose(film.snapshot().film_um, before, rtol=0, atol=1e-6)
     film.add_poses(poses(motion, slice(501, None)))
     whole = painted(lying_plane(), motion).film_um
-    assert np.allclose(
-        film.snapshot().film_um, before + 2 * (whole - before), rtol=0, atol=1e-4 * whole.max()
-    )
+    expected = before + 2 * (whole - before)
+    assert np.allclose(film.snapshot().film_um, expected, rtol=0, atol=1e-4 * whole.max())
 
 
 def test_memory_is_bounded_and_says_so():
@@ -206,11 +206,9 @@ def test_a_film_that_goes_on_begins_with_what_it_says_though_the_clock_is_set_ba
     film = followed([*states, poses(motion, slice(0, half))])
     film.reset()
     assert film.carried_over == [last]
-    begun = replace(
-        motion, stamps_ns=stamps[half:], positions_m=motion.positions_m[half:],
-        quaternions_xyzw=motion.quaternions_xyzw[half:],
-        trigger_stamps_ns=np.array([last.stamp_ns]), trigger_flow=np.array([last.flow]),
-    )  # fmt: skip
+    trigger = {'trigger_stamps_ns': last.stamp_ns, 'trigger_flow': last.flow}
+    told = {name: np.array([value]) for name, value in trigger.items()}
+    begun = part_of(motion, half, stamps_ns=stamps[half:], **told)
     film.add_poses(poses(begun, slice(None)))
     offline = painted(lying_plane(), begun)
     assert np.array_equal(film.snapshot().film_um, offline.film_um)

@@ -103,13 +103,9 @@ def test_half_width_is_where_the_profile_has_half_its_peak():
 
 @pytest.mark.parametrize(
     ('speed', 'standoff', 'offset', 'remedy'),
-    [
-        (0.0, 0.25, 0.05, 'give a number above 0'),
-        (-1.0, 0.25, 0.05, 'give a number above 0'),
-        (0.2, 0.0, 0.05, 'give a number above 0'),
-        (0.2, 0.03, -0.04, r'0.04 m in front of the TCP: give a standoff above 0.041'),
-    ],
-)
+    [*((*wrong, 0.05, 'give a number above 0') for wrong in ((0.0, 0.25), (-1.0, 0.25), (0.2, 0))),
+     (0.2, 0.03, -0.04, r'0.04 m in front of the TCP: give a standoff above 0.041')],
+)  # fmt: skip
 def test_impossible_passes_are_refused(speed, standoff, offset, remedy):
     model = DepositionModel(projection=Projection(emission_offset_m=offset))
     for one in (model, model.with_effect(EFFECTS['gun_wake'].typical())):

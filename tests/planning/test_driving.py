@@ -112,9 +112,8 @@ def test_a_slow_joint_slows_its_passes_each_as_a_whole(planned, cell, on_robot):
 
 
 def test_an_improvement_is_that_which_the_robot_drives(planned, cell):
-    better = pd.improve(
-        planned.surface, planned.trajectory, ROUND, robot=replace(cell, acceleration=0.3)
-    )
+    slow = replace(cell, acceleration=0.3)
+    better = pd.improve(planned.surface, planned.trajectory, ROUND, robot=slow)
     assert better.drive.limits
     assert 'bound by the joints' in better.warnings[-1]
     clock = Programme.of(better.trajectory)
@@ -218,9 +217,8 @@ def test_the_place_to_choose_has_good_neighbours(cell):
 
 
 def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
-    trimesh.Trimesh(planned.surface.vertices_m, planned.surface.faces, process=False).export(
-        tmp_path / 'flat.stl'
-    )
+    flat = planned.surface
+    trimesh.Trimesh(flat.vertices_m, flat.faces, process=False).export(tmp_path / 'flat.stl')
     model = tmp_path / 'round.yaml'
     pd.write_model(model, ROUND)
     part = '--mesh', tmp_path / 'flat.stl', '--max-edge-length-m', 0.05

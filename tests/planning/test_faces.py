@@ -23,9 +23,7 @@ def planned():
     return plan_faces(bumper(), NARROW, PlanRequest(target_um=20.0), 'part')
 
 
-def level_pass(
-    y_m: float, begin_m: float = 0.0, end_m: float = 1.0, one_way: bool = False
-) -> PlannedPass:
+def level_pass(y_m: float, begin_m=0.0, end_m=1.0, one_way: bool = False) -> PlannedPass:
     """A straight pass along x."""
     places = np.array([[begin_m, y_m, 0.2], [end_m, y_m, 0.2]])
     turns = np.tile(np.diag([1.0, -1.0, -1.0]), (2, 1, 1))
@@ -39,11 +37,8 @@ def test_faces_paint_the_whole_part_more_evenly_when_blended(planned):
     assert planned.sigma_n < planned.sigma_n_unblended
     assert planned.sigma_n < 0.6 * planned.sigma_n_unblended
     assert planned.statistics.mean_um == pytest.approx(20.0, rel=0.02)
-    np.testing.assert_allclose(
-        planned.film_um,
-        painted(planned.surface.points(), planned.trajectory, NARROW).film_um,
-        rtol=1e-4,
-    )
+    simulated = painted(planned.surface.points(), planned.trajectory, NARROW)
+    np.testing.assert_allclose(planned.film_um, simulated.film_um, rtol=1e-4)
 
 
 @pytest.mark.slow

@@ -81,11 +81,10 @@ def test_passes_cover_the_width_to_its_edges():
     width = 1.5
     answer = recommended(tolerance=0.05, width_m=width, target_um=20.0)
     assert any('target of 20 µm would need' in note for note in answer.notes)
+    across_m, one_pass = np.linspace(-0.5, 0.5, 201) * width, answer.curve.parallel.first
     film, fewer = (
         sum(
-            answer.curve.parallel.first.thickness_um(
-                np.linspace(-0.5, 0.5, 201) * width - (k - 0.5 * (count - 1)) * answer.index_m
-            )
+            one_pass.thickness_um(across_m - (k - 0.5 * (count - 1)) * answer.index_m)
             for k in range(count)
         )
         for count in (answer.passes, answer.passes - 1)
@@ -117,9 +116,7 @@ def test_a_simulated_serpentine_is_as_even_as_said(turns):
 
 
 def test_gun_that_turns_makes_an_asymmetric_pattern_less_even():
-    kept, turned = (
-        recommended(LOPSIDED, tolerance=0.2, gun_turns=turns) for turns in (False, True)
-    )
+    kept, turned = (recommended(LOPSIDED, tolerance=0.2, gun_turns=k) for k in (False, True))
     assert turned.sigma_n > 1.2 * kept.sigma_n
     assert 'keeps its orientation' in kept.request.assumption
     assert 'turns' in turned.request.assumption
@@ -141,22 +138,17 @@ def test_default_range_follows_the_width_of_the_pattern(scale):
 
 
 @pytest.mark.parametrize(
-    'what',
-    [
-        {'index_min_m': 0.35, 'index_max_m': 0.45},
-        {'index_min_m': 0.45, 'index_max_m': 0.55},
-        {'index_min_m': 0.29, 'index_max_m': 0.5, 'tolerance': 0.06},
-    ],
+    ('low', 'high', 'what'),
+    [(0.35, 0.45, {}), (0.45, 0.55, {}), (0.29, 0.5, {'tolerance': 0.06})],
 )
-def test_without_a_minimum_the_more_even_end_is_recommended(what):
-    answer = recommended(**what)
+def test_without_a_minimum_the_more_even_end_is_recommended(low, high, what):
+    answer = recommended(index_min_m=low, index_max_m=high, **what)
     ends = answer.windows_m[0] if 'tolerance' in what else answer.index_range_m
     assert answer.index_m in ends
     assert answer.sigma_n == pytest.approx(min(sigma_n(SYMMETRIC, end) for end in ends))
     side = 'smaller' if answer.index_m == ends[0] else 'greater'
-    assert any(
-        f'no minimum of sigma_n here; it is more even at a {side}' in note for note in answer.notes
-    )
+    told = f'no minimum of sigma_n here; it is more even at a {side}'
+    assert any(told in note for note in answer.notes)
 
 
 def test_the_speed_for_a_target_keeps_its_limits():

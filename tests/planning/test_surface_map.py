@@ -11,13 +11,8 @@ from booth import panel, panel_with_screen, serpentine
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.passes import (
-    PassStyle,
-    plan_pass,
-    plan_passes,
-    planned_moves,
-    trajectory_of,
-)
+from paint_deposition.planning import passes as gun_passes
+from paint_deposition.planning.passes import PassStyle, plan_pass, plan_passes, trajectory_of
 from paint_deposition.planning.planned_film import contacts
 from paint_deposition.planning.requests import GunEnvelope
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
@@ -48,10 +43,8 @@ def test_what_is_finer_than_the_radius_is_smoothed_away_and_what_is_wider_kept()
     ripple = sheet(lambda x, z: 0.004 * np.sin(2.0 * np.pi * x / 0.06), count=121)
     bow = sheet(lambda x, z: 0.5 * x**2)
     u = np.linspace(-0.35, 0.35, 200)
-    flat = SurfaceMap(ripple, pass_axes(ripple, outward=(0.0, -1.0, 0.0)), 0.15).height_m(
-        u, 0.0 * u
-    )
-    assert np.ptp(flat) < 0.0015
+    smoothed = SurfaceMap(ripple, pass_axes(ripple, outward=(0.0, -1.0, 0.0)), 0.15)
+    assert np.ptp(smoothed.height_m(u, 0.0 * u)) < 0.0015
     surface_map = SurfaceMap(bow, pass_axes(bow), 0.15)
     height = surface_map.height_m(u, 0.0 * u)
     # Curved by 1/m toward the gun's far side; a Gaussian of half the radius lowers it evenly.
@@ -60,11 +53,9 @@ def test_what_is_finer_than_the_radius_is_smoothed_away_and_what_is_wider_kept()
 
 def test_hidden_and_averted_surface_is_not_painted():
     front, back = sheet(lambda x, z: 0.0 * x), sheet(lambda x, z: 0.0 * x + 0.2, half_m=0.2)
-    both = Surface.from_triangles(
-        np.concatenate([front.vertices_m, back.vertices_m]),
-        np.concatenate([front.faces, back.faces + len(front.vertices_m)]),
-        0.1,
-    )
+    vertices_m = np.concatenate([front.vertices_m, back.vertices_m])
+    faces = np.concatenate([front.faces, back.faces + len(front.vertices_m)])
+    both = Surface.from_triangles(vertices_m, faces, 0.1)
     surface_map = SurfaceMap(both, pass_axes(both), 0.1)
     y = both.vertices_m[:, 1]
     assert surface_map.painted[y < 0.1].all()
@@ -143,16 +134,18 @@ def test_speed_is_even_while_spraying_and_acceleration_kept(motion):
 
 
 def test_serpentine_alternates_and_keeps_the_tool_as_it_is(bowed, motion):
-    path, _ = spray_path(motion)
-    on = path.select(path.flow > 0.0)
-    ways = [on.velocity_m_per_s[on.spray_pass == k].mean(axis=0) for k in range(3)]
+    def by_pass(motion, column: str) -> list[np.ndarray]:
+        """The mean of a column over each pass."""
+        path, _ = spray_path(motion)
+        on = path.select(path.flow > 0.0)
+        return [getattr(on, column)[on.spray_pass == k].mean(axis=0) for k in range(3)]
+
+    ways = by_pass(motion, 'velocity_m_per_s')
     assert ways[0] @ ways[1] < 0.0 < ways[0] @ ways[2]
-    tool_x = [on.rotation[on.spray_pass == k].mean(axis=0)[:, 0] for k in range(3)]
+    tool_x = [axes[:, 0] for axes in by_pass(motion, 'rotation')]
     assert tool_x[0] @ tool_x[1] > 0.9
     one_way = PassStyle(0.25, 0.3, overspray_m=0.2, one_way=True)
-    path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, one_way)))
-    on = path.select(path.flow > 0.0)
-    ways = [on.velocity_m_per_s[on.spray_pass == k].mean(axis=0) for k in range(3)]
+    ways = by_pass(trajectory_of(plan_passes(bowed, LINES_M, one_way)), 'velocity_m_per_s')
     assert min(ways[0] @ ways[1], ways[0] @ ways[2]) > 0.0
     assert motion.trigger_flow.tolist() == [1.0, 0.0] * 3
 
@@ -168,7 +161,7 @@ def test_travel_direction_in_the_tool_frame_is_the_angle_asked_for(bowed):
 
 def test_moves_of_the_robot_follow_the_same_way(bowed):
     passes = plan_passes(bowed, LINES_M, STYLE)
-    moves = planned_moves(passes)
+    moves = gun_passes.planned_moves(passes)
     assert not moves[0].spraying
     switches = np.diff([move.spraying for move in moves])
     assert np.count_nonzero(switches) == 2 * len(passes)

@@ -193,8 +193,8 @@ def test_thicker_columns_are_not_cut_off_by_a_thin_one(tmp_path):
     figure = comparison_figure(data)
     tops_um = [film.get_ylim()[1] for film in figure.axes[::2]]
     assert tops_um[0] == tops_um[1] > np.max(thick.lines_um[0])
-    few = replace(thin, line_m=np.empty(0), lines_um=np.empty((1, 0)), passes_um=np.empty((0, 0)))
-    vars(data)['profiles'] = [few]
+    none = {'line_m': np.empty(0), 'lines_um': np.empty((1, 0)), 'passes_um': np.empty((0, 0))}
+    vars(data)['profiles'] = [replace(thin, **none)]
     assert len(comparison_figure(data).axes) == 2
 
 

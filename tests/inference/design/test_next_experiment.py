@@ -51,9 +51,8 @@ def drift_or_tool(drifting, fit):
     """Drifting air, or a tool that is off its point: what says which."""
     found = drifting.fit(FreeParameters.of(fit.model))
     group = EffectClass(('air_drift', 'tcp_offset'), 0.9, 'air_drift')
-    return next_experiment.propose(
-        drifting, contenders_of(diagnosed(drifting, found, group), EFFECTS)
-    )
+    rivals = contenders_of(diagnosed(drifting, found, group), EFFECTS)
+    return next_experiment.propose(drifting, rivals)
 
 
 @pytest.mark.slow
@@ -113,9 +112,8 @@ def test_every_spray_is_the_same_paint_another_way(study, change):
     changed = change.made(experiment).path
     share = {'half_flow': 0.5, 'double_flow': 2.0, 'half_speed': 2.0, 'double_speed': 0.5}
     if change.key == 'turned':
-        assert np.median(changed.speed_m_per_s) == pytest.approx(
-            np.median(experiment.path.speed_m_per_s), rel=0.02
-        )
+        before, after = (np.median(p.speed_m_per_s) for p in (experiment.path, changed))
+        assert after == pytest.approx(before, rel=0.02)
     elif change.key != 'longer_open':
         expected = share.get(change.key, 1.0) * experiment.path.spraying_time_s
         assert changed.spraying_time_s == pytest.approx(expected)
@@ -173,20 +171,15 @@ def forecast(spread: float = 1.0) -> Forecast:
     means = rng.normal(size=(3, READINGS))
     roots = spread * rng.normal(size=(3, READINGS, 2))
     covariances = np.eye(READINGS) + roots @ roots.transpose(0, 2, 1)
-    contenders = [
-        SimpleNamespace(is_effect=True), SimpleNamespace(is_effect=True),
-        SimpleNamespace(is_effect=False),
-    ]  # fmt: skip
+    contenders = [SimpleNamespace(is_effect=is_effect) for is_effect in (True, True, False)]
     return Forecast(contenders, np.array([0.0, 0.4, 1.0]), means, np.linalg.cholesky(covariances))
 
 
 def log_odds_drawn(told: Forecast, true: int, other: int) -> np.ndarray:
     """(DRAWS,) logarithm of the odds of the true one after readings that it gives."""
     rng = np.random.default_rng(4)
-    laws = [
-        multivariate_normal(mean, factor @ factor.T)
-        for mean, factor in zip(told.means, told.factors, strict=True)
-    ]
+    each = zip(told.means, told.factors, strict=True)
+    laws = [multivariate_normal(mean, factor @ factor.T) for mean, factor in each]
     readings = laws[true].rvs(DRAWS, rng)
     return told.odds[true, other] + laws[true].logpdf(readings) - laws[other].logpdf(readings)
 
@@ -203,14 +196,15 @@ def test_the_log_odds_are_those_of_readings_that_are_drawn():
 
 def test_nothing_tells_between_explanations_that_say_the_same():
     told = forecast()
-    same = replace(
-        told,
-        log_weight=np.zeros(3),
-        means=np.tile(told.means[0], (3, 1)),
-        factors=np.tile(told.factors[0], (3, 1, 1)),
-    )
+    means, factors = np.tile(told.means[0], (3, 1)), np.tile(told.factors[0], (3, 1, 1))
+    same = replace(told, log_weight=np.zeros(3), means=means, factors=factors)
     assert same.separations == pytest.approx((0.0, 0.0), abs=1e-6)
     assert same.chance == 0.0
+    # Equal errors leave the distance of the means.
+    told = forecast(spread=0.0)
+    two = Forecast(told.contenders[:2], np.zeros(2), told.means[:2], told.factors[:2])
+    away = float(np.linalg.norm(told.means[1] - told.means[0]))
+    assert two.separations == pytest.approx((0.0, away))
 
 
 @pytest.mark.parametrize(('spread', 'alike', 'tolerance'), [(1.0, True, 1e-6), (0.5, False, 0.15)])
@@ -224,13 +218,6 @@ def test_single_readings_add_up_to_all_of_them(spread, alike, tolerance):
         placement.take(reading)
     found = placement.separation(placement.nearest())
     assert found == pytest.approx(told.separations[1], rel=tolerance)
-
-
-def test_equal_errors_leave_the_distance_of_the_means():
-    told = forecast(spread=0.0)
-    two = Forecast(told.contenders[:2], np.zeros(2), told.means[:2], told.factors[:2])
-    away = float(np.linalg.norm(told.means[1] - told.means[0]))
-    assert two.separations == pytest.approx((0.0, away))
 
 
 def test_some_readings_are_predicted_from_others():

@@ -36,18 +36,13 @@ KNOWN = replace(PARAMETERS, known=correlated(PARAMETERS))
 
 
 def linear_fit(
-    random: np.random.Generator,
-    count: int,
-    data: np.ndarray | None = None,
-    parameters: FreeParameters = PARAMETERS,
+    random: np.random.Generator, count: int, parameters: FreeParameters = PARAMETERS
 ) -> Fit:
-    """A fit of readings (count,), drawn if not given, of a linear model with noise 1."""
+    """A fit of readings (count,) of a linear model with noise 1."""
     prior = parameters.prior
     jacobian = random.normal(size=(count, len(prior.centre))) @ prior.whitening
-    if data is None:
-        data = jacobian @ (prior.centre + prior.factor @ random.normal(size=len(prior.centre)))
-        data = data + random.normal(size=count)
-    return fit_linear(jacobian, data, parameters)
+    data = jacobian @ (prior.centre + prior.factor @ random.normal(size=len(prior.centre)))
+    return fit_linear(jacobian, data + random.normal(size=count), parameters)
 
 
 def fit_linear(
@@ -78,12 +73,9 @@ def discrepancy_of(
     """Fields (P, P) of three lengths and a deviation of the footprint (P, 1), but nothing else."""
     none, unseen = np.zeros_like(fields[0]), np.empty((0, 1))
     basis = Basis(LearnedFootprint, {}, unseen, unseen.T, 1.0)
-    footprints = Footprints(
-        tuple(size * footprint for size in sizes),
-        tuple(RandomLaw(basis, 0.1 * size * np.eye(1)) for size in sizes),
-        radius_m=np.zeros(1),
-        flux=np.ones(1),
-    )
+    columns = tuple(size * footprint for size in sizes)
+    laws = tuple(RandomLaw(basis, 0.1 * size * np.eye(1)) for size in sizes)
+    footprints = Footprints(columns, laws, radius_m=np.zeros(1), flux=np.ones(1))
     one_setting = np.zeros(len(none), dtype=int)
     return ModelDiscrepancy(
         MODEL, footprints, none, tuple(fields), 3 * (none,), False, (0.02, 0.05, 0.1), one_setting

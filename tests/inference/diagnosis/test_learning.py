@@ -136,10 +136,9 @@ def test_a_fold_that_calls_for_another_set_goes_no_further():
     assert [stages[0].chosen(folds != k).names for k in range(3)] == [one.names for one in sets]
     # Where the last set is found and then pruned to the first one, it is so in every fold.
     for final, by_fold in ((last, sets), (first, [first] * len(parts))):
+        fits = [one.fit for one in by_fold]
         expected = study.errors_left_out_um(
-            lambda out, by_fold=by_fold: study.predicted_without_um(
-                by_fold[folds[out][0]].fit, out
-            )
+            lambda out, fits=fits: study.predicted_without_um(fits[folds[out][0]], out)
         )
         found_um = learning.LeftOut(stages, final, []).errors_um()
         assert found_um == pytest.approx([expected] * (1 + learning.MOST_LAWS))
@@ -169,6 +168,5 @@ def test_the_unexplained_is_told_by_its_place_its_size_and_the_part_that_it_bega
     on_all = replace(unknown, parts=('panel 1', *unknown.parts), since='', mean_residual_um=-6.0)
     assert 'less than the model says, on panel 1, panel 2, panel 3; it' in str(on_all)
     nowhere = replace(unknown, parts=(), where='no single place stands out')
-    assert str(nowhere) == (
-        f'It shows most against {unknown.covariate}; no single place stands out.'
-    )
+    shows = f'It shows most against {unknown.covariate}; no single place stands out.'
+    assert str(nowhere) == shows

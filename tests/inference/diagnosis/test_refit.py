@@ -100,10 +100,8 @@ def test_what_does_not_vary_cannot_be_learned(campaign):
 
 def painted(folder, truth, part):
     """A campaign whose passes take brush 1 and the narrower brush 2 in turn, and its truth."""
-    made = generate(
-        5, truth, experiments=(part,), readings=90, repeats=24, second_brush=0.75,
-        parcels=2_000_000,
-    )  # fmt: skip
+    options = {'readings': 90, 'repeats': 24, 'second_brush': 0.75, 'parcels': 2_000_000}
+    made = generate(5, truth, experiments=(part,), **options)
     return pd.read_campaign(write(made, folder)), made.truth
 
 

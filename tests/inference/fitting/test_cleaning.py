@@ -10,14 +10,9 @@ from inference.fitting.panels import ORDERS, column, grid_m, painted_by, passes,
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.state import trouble_with
-from paint_deposition.inference.fitting import cleaning
+from paint_deposition.inference.fitting import cleaning, outliers
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.inference.fitting.outliers import (
-    FittedPoints,
-    LeaveOneOut,
-    Outlier,
-    find_outliers,
-)
+from paint_deposition.inference.fitting.outliers import FittedPoints, LeaveOneOut, find_outliers
 from paint_deposition.inference.readings.covariates import Covariate
 from paint_deposition.report.words import count_words
 from small_campaign import small_campaign
@@ -108,7 +103,7 @@ def test_a_prediction_without_the_reading_is_that_of_the_others_alone():
     [(312.0, 30.4, 31.2), (3.12, 30.4, 31.2), (13.2, 30.9, 31.2), (0.2, 30.4, None)],
 )
 def test_what_was_probably_meant(written, expected, guess):
-    outlier = Outlier('door: P7', written, expected, 0.9)
+    outlier = outliers.Outlier('door: P7', written, expected, 0.9)
     assert outlier.guess_um == (None if guess is None else pytest.approx(guess))
     assert f"point 'door: P7': {written:.4g} µm" in str(outlier)
     assert ('?' in str(outlier)) == (guess is not None)
@@ -152,9 +147,8 @@ def test_a_thick_film_without_texture_is_no_broken_fit():
     film = even.readings.thickness_um * 80.0 / even.readings.thickness_um.mean()
     readings = film + 0.5 * np.random.default_rng(8).normal(size=len(film))
     stated = pd.Readings.of(at, readings, sigma_um=np.full(len(film), 0.5))
-    study, fit = cleaning.clean_and_fit(
-        pd.Campaign((even.with_readings(stated),)), MODEL, starts=1
-    )
+    campaign = pd.Campaign((even.with_readings(stated),))
+    study, fit = cleaning.clean_and_fit(campaign, MODEL, starts=1)
     assert trouble_with(study, fit) == ''
     assert study.estimated_texture < 0.004
     assert study.noise_figures['texture_source'] == 'neighbours'

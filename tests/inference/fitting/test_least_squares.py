@@ -57,9 +57,8 @@ def test_the_forward_model_is_the_film_at_the_readings(spotted, exact):
 
 
 def test_a_known_pattern_comes_back_from_readings_without_noise(forward, exact):
-    fit = fit_readings(
-        forward, exact, np.full(len(exact), 0.003), FreeParameters.of(BASE), starts=6
-    )
+    sigma_um = np.full(len(exact), 0.003)
+    fit = fit_readings(forward, exact, sigma_um, FreeParameters.of(BASE), starts=6)
     assert fit.converged
     assert fit.chi_square < 1.0
     for name, value in TRUTH.planar:
@@ -129,9 +128,8 @@ def test_a_point_is_as_certain_as_its_repeats_and_the_films_texture():
     assert study.noise.source == 'repeats'
     assert study.noise.degrees_of_freedom == 3 * len(study)
     gauge = study.noise.sigma_um[: len(study)]
-    assert study.sigma_um == pytest.approx(
-        np.sqrt(gauge**2 / 4 + (TEXTURE_SHARE * study.measured_um) ** 2), rel=0.02
-    )
+    expected = np.hypot(gauge / 2, TEXTURE_SHARE * study.measured_um)
+    assert study.sigma_um == pytest.approx(expected, rel=0.02)
     assert study.nuisance.shape == (len(study), 0)
 
 
@@ -165,9 +163,8 @@ def test_a_model_without_a_law_of_the_study_does_not_have_it():
     law = LEARNED['incidence_deg'](low=0.0, high=60.0, learned=(0.1, 0.4))
     campaign = pd.Campaign((painted_by(BASE, passes([0.7, 1.3]), column(0.5, 1.5, 9)),))
     other = pd.DepositionModel(effects=(EFFECTS['pattern_spread'].typical(),))
-    np.testing.assert_array_equal(
-        Forward(campaign, (law,)).predict_um(other), Forward(campaign).predict_um(other)
-    )
+    alone = Forward(campaign).predict_um(other)
+    np.testing.assert_array_equal(Forward(campaign, (law,)).predict_um(other), alone)
 
 
 PATTERNS = st.builds(
@@ -179,10 +176,8 @@ PATTERNS = st.builds(
 
 @given(PATTERNS, st.floats(-0.1, 0.1), st.floats(0.0, 2.0))
 def test_a_model_survives_the_way_there_and_back(planar, shift_m, gain):
-    model = pd.DepositionModel(
-        planar=planar,
-        effects=(AirDrift(shift_across_m=shift_m), CornerSlowdown(gain=gain, length_m=0.2)),
-    )
+    effects = AirDrift(shift_across_m=shift_m), CornerSlowdown(gain=gain, length_m=0.2)
+    model = pd.DepositionModel(planar=planar, effects=effects)
     parameters = FreeParameters.of(model, *model.effects)
     again = parameters.decode(parameters.encode(model))
     for name, value in planar:
@@ -199,15 +194,12 @@ def test_shapes_are_varied_on_a_logarithmic_scale():
     assert parameters.varied == (('corner_slowdown', 'gain'), ('corner_slowdown', 'length_m'))
     vector = parameters.encode(parameters.start)
     info = CornerSlowdown.parameters()['length_m']
-    lengths = []
-    for entry in (-0.5, 0.0, 0.5):
-        vector[-1] = entry
-        effect = parameters.decode(vector).effect('corner_slowdown')
-        assert effect.gain == pytest.approx(0.5)
-        lengths.append(effect.length_m)
-    assert lengths[1] == pytest.approx(info['neutral'])
-    assert lengths[2] / lengths[1] == pytest.approx(lengths[1] / lengths[0])
-    assert lengths[2] > lengths[0]
+    vectors = [np.append(vector[:-1], entry) for entry in (-0.5, 0.0, 0.5)]
+    effects = [parameters.decode(each).effect('corner_slowdown') for each in vectors]
+    assert [effect.gain for effect in effects] == pytest.approx([0.5] * 3)
+    low, middle, high = (effect.length_m for effect in effects)
+    assert middle == pytest.approx(info['neutral'])
+    assert high / middle == pytest.approx(middle / low) > 1.0
     low, high = parameters.bounds
     assert high[-1] - low[-1] == pytest.approx(SHAPE_DEVIATIONS)
     ends = [parameters.decode(end).effect('corner_slowdown').length_m for end in (low, high)]

@@ -11,14 +11,10 @@ from inference.diagnosis.linear import KNOWN, PARAMETERS, correlated, linear_fit
 from inference.fitting.panels import painted_by, passes
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.errors import ModelError
+from paint_deposition.inference.fitting import posterior as jobs
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.posterior import (
-    PatternShift,
-    draw_models,
-    posterior_of,
-    prior_for,
-)
+from paint_deposition.inference.fitting.posterior import PatternShift, draw_models, posterior_of
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import EFFECT_BETWEEN_JOBS, PATTERN
@@ -80,12 +76,12 @@ def test_no_reading_counts_twice(panel, campaign):
     fit = linear_fit(np.random.default_rng(4), 60)
     posterior = posterior_of(fit, campaign)
     assert posterior.readings == (panel.taken.fingerprint,)
-    known, remarks = prior_for(posterior, campaign)
+    known, remarks = jobs.prior_for(posterior, campaign)
     assert known is None
     assert 'panel' in remarks[0]
     other = thicker(panel)
-    assert prior_for(posterior, other) == (posterior, ())
-    assert prior_for(None, campaign) == (None, ())
+    assert jobs.prior_for(posterior, other) == (posterior, ())
+    assert jobs.prior_for(None, campaign) == (None, ())
     later = replace(fit, parameters=replace(fit.parameters, known=posterior))
     (added,) = (part.taken.fingerprint for part in other.experiments)
     assert posterior_of(later, other).readings == (*posterior.readings, added)
@@ -95,11 +91,11 @@ def test_other_settings_of_the_process_are_told(panel):
     calibrated = pd.Campaign((replace(panel, settings={'voltage_kv': 60.0, 'flow': 1.0}),))
     posterior = posterior_of(linear_fit(np.random.default_rng(4), 60), calibrated)
     assert posterior.process == {'voltage_kv': 60.0, 'flow': 1.0}
-    known, (remark,) = prior_for(posterior, thicker(panel, voltage_kv=0.0, flow=1.01))
+    known, (remark,) = jobs.prior_for(posterior, thicker(panel, voltage_kv=0.0, flow=1.01))
     assert known == posterior
     assert 'calibrated at voltage_kv 60, this job was painted at 0:' in remark
     for settings in ({'voltage_kv': 61.0}, {}):
-        assert prior_for(posterior, thicker(panel, **settings)) == (posterior, ())
+        assert jobs.prior_for(posterior, thicker(panel, **settings)) == (posterior, ())
 
 
 # How far a pattern moved from the calibration.

@@ -11,14 +11,9 @@ from inference.fitting.panels import gauged, grid_m, painted_by, passes, reading
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.inference.diagnosis.verdict import Step
+from paint_deposition.inference.fitting import random_effects as effects
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
-from paint_deposition.inference.fitting.random_effects import (
-    LEVEL_SHARE,
-    OTHER_LEVEL_SHARE,
-    SESSION_UM,
-    amounts,
-    random_effects,
-)
+from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM, amounts
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import root_mean_square
@@ -29,9 +24,8 @@ def part(name: str, session: str | np.ndarray = '') -> Experiment:
     """Read from the middle of the pass to where hardly any paint arrives."""
     places = grid_m(4, 10, 1.0, 1.5)
     one = painted_by(pd.DepositionModel(), passes([1.0]), places, name=name)
-    return one.with_readings(
-        replace(one.readings, session=np.broadcast_to(session, len(one.readings)))
-    )
+    sessions = np.broadcast_to(session, len(one.readings))
+    return one.with_readings(replace(one.readings, session=sessions))
 
 
 def study_of(*parts: Experiment) -> Study:
@@ -63,9 +57,8 @@ def test_a_level_and_a_zero_come_back_with_their_uncertainty():
     assert f'{level}'.startswith(f'part level of left: +{level.value:.2f} ± ')
     # The one residual is beside these levels; what all parts have in common is the model's.
     film_um = study.measured_um
-    assert study.residuals((1.0 - 0.03 * sign) * film_um).rmse_um < 0.006 * np.sqrt(
-        np.mean(film_um**2)
-    )
+    left = study.residuals((1.0 - 0.03 * sign) * film_um)
+    assert left.rmse_um < 0.006 * root_mean_square(film_um)
     assert study.residuals(0.97 * film_um).residual_um == pytest.approx(0.03 * film_um)
 
 
@@ -83,7 +76,7 @@ def test_a_part_without_voltage_has_a_level_of_its_own():
     first, other = level.columns.T
     assert not first.any()  # there is no other part that it could differ from
     rows = study.campaign.experiment_of == 1
-    share = OTHER_LEVEL_SHARE * study.measured_um / study.sigma_um
+    share = effects.OTHER_LEVEL_SHARE * study.measured_um / study.sigma_um
     np.testing.assert_allclose(other, np.where(rows, share, 0.0))
     double = study.residuals(study.measured_um * np.where(rows, 2.0, 1.0))
     np.testing.assert_allclose(double.predicted_um, study.measured_um, rtol=0.02)
@@ -94,14 +87,15 @@ def test_a_part_without_voltage_has_a_level_of_its_own():
 def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves():
     study = study_of(part('left'), part('roof'), part('right'))
     owner = study.campaign.experiment_of
-    level, zero = random_effects(study.campaign, study.measured_um, study.sigma_um, owner != 1)
+    known = study.campaign, study.measured_um, study.sigma_um
+    level, zero = effects.random_effects(*known, owner != 1)
     others = np.array([[0.5, 0.0, -0.5], [0.0, 0.0, 0.0], [-0.5, 0.0, 0.5]])
     assert level.mixing == pytest.approx(100.0 * LEVEL_SHARE * others)
     assert not level.columns[owner == 1].any()
     # Its readings without a name of their session were taken in one of their own.
     assert zero.mixing == pytest.approx(SESSION_UM * others)
     # One that is left has nothing that it could differ from.
-    assert random_effects(study.campaign, study.measured_um, study.sigma_um, owner == 0) == ()
+    assert effects.random_effects(*known, owner == 0) == ()
 
 
 def test_two_sessions_on_one_part_differ_by_their_zero():
@@ -167,10 +161,11 @@ def test_a_level_that_no_other_part_tells_is_no_error_on_a_part_left_out():
     model = pd.refit(pd.Campaign((first, second)), None, BASE).model
     anew = pd.compare(pd.Campaign((off,)), model).points.rmse_um
     found = study.errors_left_out_um(lambda out: study.predicted_without_um(fit, out))
-    usual = study.campaign.experiment_of != 2
+    owner = study.campaign.experiment_of
+    usual = owner != 2
     others = [
-        (study.measured_um - study.predicted_without_um(fit, out))[out]
-        for out in (study.campaign.experiment_of == 0, study.campaign.experiment_of == 1)
+        (study.measured_um - study.predicted_without_um(fit, owner == k))[owner == k]
+        for k in (0, 1)
     ]
     squares = np.sum(usual) * root_mean_square(np.concatenate(others)) ** 2
     expected = np.sqrt((squares + np.sum(~usual) * anew**2) / len(study))

@@ -1,6 +1,6 @@
 """Repeats: the noise they show and outliers among them; readings on the surface."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -32,25 +32,21 @@ def usual_noise_um(film_um: np.ndarray) -> np.ndarray:
     return np.hypot(0.7, 0.01 * film_um)
 
 
-def campaigns(
-    layout: str, noise: Callable[[int], np.ndarray]
-) -> Iterator[tuple[pd.Readings, np.ndarray]]:
-    """Readings of 20 to 60 um and the film below them; `noise(count)` is in usual noises."""
+def campaigns(layout: str, random) -> Iterator[tuple[pd.Readings, np.ndarray]]:
+    """Readings of 20 to 60 um with the usual noise, and the film below them."""
     repeats = LAYOUTS[layout]
     owner = np.repeat(np.arange(len(repeats)), repeats)
     film = np.linspace(20.0, 60.0, len(repeats))[owner]
     for _ in range(CAMPAIGNS):
-        thickness = film + usual_noise_um(film) * noise(len(owner))
+        thickness = film + usual_noise_um(film) * random.normal(size=len(owner))
         yield pd.Readings.of(np.zeros((len(owner), 3)), thickness, point=owner.astype(str)), film
 
 
 def at_points(points: str, thickness_um, sigma_um=np.nan) -> pd.Readings:
     """Readings at points of one letter each."""
-    count = len(thickness_um)
-    return pd.Readings.of(
-        np.zeros((count, 3)), thickness_um, point=np.array(list(points)),
-        sigma_um=np.broadcast_to(sigma_um, count).astype(float),
-    )  # fmt: skip
+    places, sigma_um = np.zeros((len(points), 3)), np.broadcast_to(sigma_um, len(points))
+    point = np.array(list(points))
+    return pd.Readings.of(places, thickness_um, point=point, sigma_um=sigma_um.astype(float))
 
 
 def honest_pairs(count: int = 10, sigma_um: float = 0.7) -> tuple[str, list[float]]:
@@ -65,7 +61,7 @@ def test_normal_readings_stay_and_their_noise_is_unbiased(layout):
     """100 campaigns with 20 degrees of freedom or more know a standard deviation to 1.6 %."""
     random = np.random.default_rng(3)
     squares, dropped = [], []
-    for readings, film in campaigns(layout, lambda count: random.normal(size=count)):
+    for readings, film in campaigns(layout, random):
         noise = gauge_noise(readings)
         squares.append(np.mean((noise.sigma_um / usual_noise_um(film)) ** 2))
         dropped.append(noise.gross.mean())
@@ -99,32 +95,25 @@ def test_the_minority_at_a_point_is_wrong(thickness, gross):
     # Nine pairs in ten without any scatter are no reason to doubt the tenth.
     assert not gross_outliers(at_points(labels, [26.0] * 19 + [27.0])).any()
     # The point is on another part, which has a point of the name 'A' as well.
-    found = gross_outliers(
-        pd.Readings.joined(
-            {'rest': at_points(labels, others), 'here': at_points('A' * len(gross), thickness)}
-        )
-    )
+    here = at_points('A' * len(gross), thickness)
+    both = pd.Readings.joined({'rest': at_points(labels, others), 'here': here})
+    found = gross_outliers(both)
     assert found[20:].tolist() == gross
     assert not found[:20].any()
 
 
-@pytest.mark.parametrize(
-    ('points', 'thickness', 'gross'),
-    [('aab', [26.0, 45.0, 20.0], [True, True, False]), ('aab', [26.0, 32.0, 20.0], [False] * 3),
-     ('', [], [])],
-)  # fmt: skip
-def test_without_enough_repeats_only_what_no_gauge_reads_is_gross(points, thickness, gross):
-    assert gross_outliers(at_points(points, thickness)).tolist() == gross
+def test_without_enough_repeats_only_what_no_gauge_reads_is_gross():
+    for thickness, gross in (([26.0, 45.0, 20.0], [True, True, False]),
+                             ([26.0, 32.0, 20.0], [False] * 3), ([], [])):  # fmt: skip
+        found = gross_outliers(at_points('aab'[: len(gross)], thickness))
+        assert found.tolist() == gross
 
 
 def test_what_is_left_out_is_named():
     taken = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
-    lines = left_out_lines(taken, np.array([False, True, False, False, True]))
-    assert lines == [
-        "point 'a': 15.5, 26.25 µm contradict each other; left out of the fit, measure there "
-        'again',
-        "point 'b': 4 µm beside 20, 20.5; left out of the fit, measure it again",
-    ]
+    one, other = left_out_lines(taken, np.array([False, True, False, False, True]))
+    assert one.startswith("point 'a': 15.5, 26.25 µm contradict each other; left out of the fit")
+    assert other.startswith("point 'b': 4 µm beside 20, 20.5; left out of the fit")
 
 
 def test_repeats_are_averaged_in_order_of_first_appearance():
@@ -143,13 +132,11 @@ def test_one_label_at_two_places_is_refused():
         require_repeats_close(pd.Readings.of(places, [1.0, 2.0, 3.0], point=labels))
 
 
-@pytest.mark.parametrize('thickness', [[20.0, 30.0], [20.0] * 9])
-def test_without_scatter_to_go_by_the_usual_noise_is_assumed(thickness):
-    labels = 'ab' if len(thickness) == 2 else 'a' * 9
-    noise = gauge_noise(at_points(labels, thickness))
-    assert noise.source == 'assumed'
-    assert noise.degrees_of_freedom == ASSUMED_FREEDOM
-    assert noise.sigma_um == pytest.approx(np.hypot(0.7, 0.01 * np.array(thickness)))
+def test_without_scatter_to_go_by_the_usual_noise_is_assumed():
+    for labels, thickness in (('ab', [20.0, 30.0]), ('a' * 9, [20.0] * 9)):
+        noise = gauge_noise(at_points(labels, thickness))
+        assert (noise.source, noise.degrees_of_freedom) == ('assumed', ASSUMED_FREEDOM)
+        assert noise.sigma_um == pytest.approx(usual_noise_um(np.array(thickness)))
 
 
 def test_noise_is_pooled_within_points_beside_those_whose_noise_is_stated():
@@ -204,25 +191,17 @@ def test_the_cause_is_named_with_both_boxes(positions_m, words):
     with pytest.raises(ReadingsError, match=words) as refused:
         placed(positions_m)
     assert 'the readings span' in str(refused.value)
-    assert 'and the part x -0.500 to 0.500, y 0.000 to 0.000, z -0.500 to 0.500 m' in str(
-        refused.value
-    )
-
-
-def test_a_small_cluster_of_readings_is_none_of_these():
-    """Three repeats beside each other on a large part are readings, not a mistake."""
+    assert 'and the part x -0.500 to 0.500, y 0.000 to 0.000, z -0.500' in str(refused.value)
+    # Three repeats beside each other on a large part are readings, not a mistake.
     assert len(placed(PLACES_M[0] + 0.001 * PLACES_M[:3])) == 3
 
 
 @pytest.mark.parametrize(
     ('factor', 'guessed', 'words'),
-    [
-        (0.1, True, 'in cm, too: say unit: {position: cm}, or mm'),
-        (1 / 25.4, True, 'in cm and in inch, too: say unit: {position: inch}, or mm'),
-        (0.1, False, ''),
-        (1.0, True, ''),
-    ],
-)
+    [(0.1, True, 'in cm, too: say unit: {position: cm}, or mm'),
+     (1 / 25.4, True, 'in cm and in inch, too: say unit: {position: inch}, or mm'),
+     (0.1, False, ''), (1.0, True, '')],
+)  # fmt: skip
 def test_a_guessed_unit_is_doubted_where_another_fits(factor, guessed, words):
     readings = pd.Readings.of(factor * PLACES_M, np.full(4, 20.0), unit_is_guessed=guessed)
     doubt = unit_in_doubt(panel(), readings)
