@@ -17,9 +17,8 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 
-CONTEXT = PathContext(
-    MODEL.projection, np.array([0.0, 0.0, -1.0]), np.array([0.0, -1.0, 0.0]), np.zeros(3)
-)
+DOWN, OUTWARD = np.array([0.0, 0.0, -1.0]), np.array([0.0, -1.0, 0.0])
+CONTEXT = PathContext(MODEL.projection, DOWN, OUTWARD, np.zeros(3))
 RADIUS_M = 0.25
 
 
@@ -78,13 +77,10 @@ def blinking():
 
 @pytest.mark.parametrize(
     ('trajectory', 'fall_s', 'tolerance'),
-    [
-        (serpentine((0.1, -0.1)), 0.03, 2e-5),
-        (serpentine((0.1, -0.1), flow=0.5), 0.03, 2e-5),
-        (blinking(), 0.05, 5e-4),
-    ],
+    [*((serpentine((0.1, -0.1), flow=flow), 0.03, 2e-5) for flow in (1.0, 0.5)),
+     (blinking(), 0.05, 5e-4)],
     ids=['full flow', 'half flow', 'blinking'],
-)
+)  # fmt: skip
 def test_trigger_lag_solves_its_equation(trajectory, fall_s, tolerance):
     path = spray_path(trajectory, max_step_m=2e-4)[0]
     lagged = after(trigger_lag(rise_s=0.05, fall_s=fall_s), path)
@@ -150,9 +146,8 @@ def test_what_flows_behind_a_closing_has_drifted_like_the_pass(lag):
 def test_film_on_surface_of_250_mm_radius(name, values, convex_um, flat_um, concave_um):
     effect, found = EFFECTS[name](**values), []
     for curvature in (-1.0 / RADIUS_M, 0.0, 1.0 / RADIUS_M):
-        point = SurfacePoints(
-            np.zeros((1, 3)), np.array([[0.0, -1.0, 0.0]]), curvature_per_m=np.array([curvature])
-        )
+        place, normal = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0]])[:, np.newaxis]
+        point = SurfacePoints(place, normal, curvature_per_m=np.array([curvature]))
         film_um = effect.on_film(np.array([20.0]), point)
         found += effect.on_gauge(film_um, point).tolist()
         if name == 'gauge_curvature_bias':
@@ -210,10 +205,8 @@ def distance_ratio(standoff_m: float) -> float:
 
 def moved_by_m(trajectory: pd.Trajectory, effect) -> np.ndarray:
     """How the spot's centroid moves: right and down [m]."""
-    before, after = (
-        booth.centroid_m(painted(panel(), trajectory, *effects).raw_um, POINTS)
-        for effects in ((), (effect,))
-    )
+    films = (painted(panel(), trajectory, *effects).raw_um for effects in ((), (effect,)))
+    before, after = (booth.centroid_m(film_um, POINTS) for film_um in films)
     return (after - before)[[0, 2]] * [1.0, -1.0]
 
 

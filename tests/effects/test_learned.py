@@ -235,8 +235,6 @@ def test_each_part_follows_its_own_map():
     assert second.tolist() == [[0.1, 0.2], [0.3, 0.4]]
 
 
-# The footprint.
-
 REACH_M = 0.2
 STEP_M = REACH_M / 4
 # At each of five radii, of which the innermost has no direction.
@@ -270,18 +268,12 @@ def test_at_its_radii_it_has_the_mean_and_the_harmonics_that_were_given():
         radius = ring * STEP_M
         found = FOOTPRINT.h(radius * np.cos(angle), radius * np.sin(angle))
         np.testing.assert_allclose(found, values @ table, atol=1e-9)
-
-
-def test_between_two_radii_it_is_linear_and_one_step_beyond_reach_nothing():
     along = FOOTPRINT.h(np.array([1.0, 1.25, 2.0]) * STEP_M, np.zeros(3))
     assert along[1] == pytest.approx(0.75 * along[0] + 0.25 * along[2])
     beyond = np.array([REACH_M + STEP_M, 3.0 * REACH_M])
     assert FOOTPRINT.h(beyond, np.zeros(2)).tolist() == [0.0, 0.0]
     for radius in beyond:
         assert FOOTPRINT.flux_factor(at(0.0, radius), *FOOTPRINT.values()) == 1.0
-
-
-def test_at_the_very_centre_it_is_finite():
     for x_m in (0.0, 1e-12):
         found = FOOTPRINT.flux_factor(at(x_m, 0.0), *FOOTPRINT.values())
         assert found == pytest.approx(1.0 + RINGS[0, 0])

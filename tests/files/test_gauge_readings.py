@@ -56,10 +56,7 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
 @pytest.mark.parametrize(
     ('lines', 'message'),
     [
-        (
-            ['x_m,y_m,thickness_um', '0,0,20'],
-            r"known as z \(columns: 'x_m', 'y_m', 'thickness_um'",
-        ),
+        (['x_m,y_m,thickness_um', '0,0,20'], r"known as z \(columns: 'x_m', 'y_m', 'thickness_u"),
         (['x_mm,y_m,z_m,thickness_um', '0,0,0,20'], 'x, y, z are in .* give all in one of m, mm'),
         (['x,y,z,DFT', 'ell,ell,ell,um', '0,0,0,20'], "x, y, z are in 'ell'; give all in one"),
         (['x_m,y_m,z_m,thickness_m', '0,0,0,1'], 'no column is known as the thick'),

@@ -12,8 +12,6 @@ from booth import SAMPLES
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap, PartGrid
-from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
-from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.effect_file import load_effect_file
@@ -39,7 +37,7 @@ def test_every_effect_reads_back(effect, tmp_path: Path):
 
 
 def test_shadows_of_the_projection_are_the_effect(file):
-    for word, effects in (('true', (Occlusion(strength=1.0),)), ('false', ())):
+    for word, effects in (('true', (EFFECTS['occlusion'](strength=1.0),)), ('false', ())):
         path = file('model.yaml', f'projection: {{occlusion: {word}}}')
         assert read_model(path) == DepositionModel(effects=effects)
         write_model(path, read_model(path))
@@ -85,9 +83,8 @@ def learned(law: type[LearnedLaw]) -> LearnedLaw:
     """One whose numbers are none that a short decimal says."""
     third, kind = 1.0 / 3.0, law.kinds[-1]
     if law is LearnedMap:
-        grid = PartGrid(
-            part_m=(1.0, third, 2.0), low_m=(-third, 0.0), high_m=(0.1, third), columns=3, rows=2
-        )
+        ends = {'low_m': (-third, 0.0), 'high_m': (0.1, third)}
+        grid = PartGrid(part_m=(1.0, third, 2.0), **ends, columns=3, rows=2)
         return law(maps=(grid, grid), kind=kind, learned=(0.1, -third, 1e-7) * 4)
     if law is LearnedFootprint:
         return law(reach_m=third, learned=(0.1, -third, 1e-7, 0.0, 2.0) * 3)
@@ -203,7 +200,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-CORNERS = DepositionModel(effects=(CornerSlowdown(gain=0.5, length_m=0.2),))
+CORNERS = DepositionModel(effects=(EFFECTS['corner_slowdown'](gain=0.5, length_m=0.2),))
 NAMES = [*(c.name for c in PATTERN), 'corner_slowdown.gain', 'corner_slowdown.log_length_m']
 
 
@@ -255,9 +252,7 @@ def test_what_is_wrong_with_a_posterior_is_said_in_one_line(with_posterior, chan
     assert words in message
 
 
-def test_files_have_the_rights_of_the_process_and_its_umask_is_never_changed(
-    tmp_path, monkeypatch
-):
+def test_files_have_the_rights_of_the_process_whose_umask_is_not_changed(tmp_path, monkeypatch):
     before = os.umask(0o027)
     # The mask belongs to the process: two threads that set it and put it back can leave it at 0.
     monkeypatch.setattr(os, 'umask', lambda mask: pytest.fail('the umask was changed'))

@@ -83,7 +83,6 @@ def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():
         film.add_trigger(TriggerChange(int(stamps_ns(0.5)), 1.0, 3))
     with pytest.raises(ModelError, match=r'^no brush is named; its brushes: 1, 2$'):
         film.add_trigger(TriggerChange(int(stamps_ns(0.5)), 1.0))
-    # A closed gun has no brush.
     film.add_trigger(TriggerChange(int(stamps_ns(0.6)), 0.0, 3))
     assert [event.brush for event in film.log.events()] == [2, 3]
 

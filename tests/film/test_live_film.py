@@ -28,10 +28,8 @@ MODEL = pd.DepositionModel()
 # Its film at a place depends on what lies ahead in the stroke.
 LAGGING = MODEL.with_effect(effect_class('corner_slowdown').typical())
 TIMES_S = np.arange(0.0, 4.0, 0.004)
-TRIGGERS = {
-    'trigger_stamps_ns': stamps_ns([0.5013, 1.7502, 2.2]),
-    'trigger_flow': np.array([1.0, 0.0, 0.8]),
-}
+CHANGES_NS, FLOW = stamps_ns([0.5013, 1.7502, 2.2]), np.array([1.0, 0.0, 0.8])
+TRIGGERS = {'trigger_stamps_ns': CHANGES_NS, 'trigger_flow': FLOW}
 
 
 def change(time_s: float, flow: float) -> TriggerChange:

@@ -30,12 +30,17 @@ def test_area_weighs_not_the_number_of_vertices():
     assert (stats.min_um, stats.max_um) == (10.0, 30.0)
 
 
-def test_bare_metal_and_dust_count_for_coverage_and_volume_only():
+def test_bare_metal_counts_for_coverage_and_volume_only_and_figures_say_what_is_not_known():
     film, area = np.array([0.0, 0.5, 20.0]), np.array([0.5, 0.25, 0.25])
     stats = film_statistics(film, area, emitted_cm3=10.0, painted_above_um=1.0)
     assert stats.coverage == pytest.approx(0.25)
     assert stats.mean_um == stats.min_um == stats.max_um == 20.0
     assert stats.painted_volume_cm3 == pytest.approx(0.125 + 5.0)
+    stats = film_statistics(np.zeros(4), np.full(4, 0.25), emitted_cm3=0.0)
+    assert math.isnan(stats.within_target)
+    assert math.isnan(stats.capture_fraction)
+    assert stats.to_dict()['capture_fraction'] is None
+    assert (stats.mean_um, stats.std_dev_um, stats.max_um, stats.coverage) == (0, 0, 0, 0)
 
 
 def test_below_within_and_above_share_the_painted_area():
@@ -43,7 +48,6 @@ def test_below_within_and_above_share_the_painted_area():
     stats = film_statistics(film, area, 1.0, target_um=20.0, target_tolerance_um=5.0)
     shares = stats.below_target, stats.within_target, stats.above_target
     assert shares == pytest.approx((0.2, 0.5, 0.3))
-    # A band that reaches bare metal is none.
     with pytest.raises(PaintError, match='tolerance_um 20 is not less than target_um 20: bare'):
         film_statistics(np.ones(1), np.ones(1), 1.0, target_um=20.0, target_tolerance_um=20.0)
 
@@ -54,14 +58,6 @@ def test_cpk_is_the_way_to_the_nearer_limit_over_three_standard_deviations():
     for target, cpk in ((20.0, 1.0), (22.0, 4.0 / 6.0), (28.0, -2.0 / 6.0)):
         stats = film_statistics(*half, target_um=target, target_tolerance_um=6.0)
         assert stats.cpk == pytest.approx(cpk, rel=1e-12)
-
-
-def test_without_target_or_paint_figures_say_so():
-    stats = film_statistics(np.zeros(4), np.full(4, 0.25), emitted_cm3=0.0)
-    assert math.isnan(stats.within_target)
-    assert math.isnan(stats.capture_fraction)
-    assert stats.to_dict()['capture_fraction'] is None
-    assert (stats.mean_um, stats.std_dev_um, stats.max_um, stats.coverage) == (0, 0, 0, 0)
 
 
 def test_zones_share_the_area_and_add_up_to_the_whole():
@@ -93,7 +89,6 @@ def test_zones_share_the_area_and_add_up_to_the_whole():
     assert 'zones' not in film_statistics(film, area, 1.0).to_dict()
 
 
-# 180 cm3/min is 3 cm3/s, 360 is 6.
 ONE = Brush(number=1, planar=NARROW, flow_cm3_per_min=180.0, solids=0.5, density_g_per_cm3=1.2)
 TWO = Brush(number=2, planar=WIDE, flow_cm3_per_min=360.0, solids=0.5, density_g_per_cm3=1.1)
 
@@ -155,8 +150,6 @@ def test_more_solids_than_are_sprayed_are_told():
     assert efficiency(thin) == pytest.approx(1.3)
     (line,) = statistics.impossible_brushes(DepositionModel.of_brushes([thin, TWO]))
     assert line.startswith('brush 1 would lay 1.30 times the solids that it sprays')
-    assert math.isnan(efficiency(Brush(number=2, planar=WIDE)))
-    assert (
-        statistics.impossible_brushes(DepositionModel.of_brushes([Brush(number=2, planar=WIDE)]))
-        == ()
-    )
+    silent = Brush(number=2, planar=WIDE)
+    assert math.isnan(efficiency(silent))
+    assert statistics.impossible_brushes(DepositionModel.of_brushes([silent])) == ()

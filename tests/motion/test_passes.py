@@ -127,7 +127,7 @@ def test_a_pass_along_a_crowned_part_is_one(radius_m, sweep_rad, followed):
         assert len(set(path.stroke[beyond])) == 1
 
 
-def test_a_gun_that_is_tilted_on_a_straight_pass_does_not_turn():
+def test_a_gun_that_is_tilted_on_a_straight_pass_or_trembles_at_rest_does_not_turn():
     x = np.arange(0.0, 1.2, 0.003)
     straight = level(x / 0.3, np.column_stack([x, 0.0 * x]))
     tilt = Rotation.from_euler('y', 2.0 * (x / 1.2 - 0.5))
@@ -135,6 +135,9 @@ def test_a_gun_that_is_tilted_on_a_straight_pass_does_not_turn():
     path, _ = spray_path(replace(straight, quaternions_xyzw=quaternions))
     assert path.stroke.max() == 0
     assert path.spray_pass.max() == 0
+    times = np.arange(0.0, 3.0, 0.01)
+    still = level(times, np.zeros((len(times), 2)), noise_m=2e-4, seed=5)
+    assert spray_path(still)[0].stroke[-1] == 0
 
 
 @pytest.mark.parametrize(('shift_m', 'passes'), [(0.0, 1), (0.2, 2)])
@@ -220,15 +223,8 @@ def test_distances_to_turns_add_up_to_the_leg():
         to_m, from_m = path.to_turn_m[rows], path.from_turn_m[rows]
         assert np.allclose(to_m + from_m, end_m - begin_m, atol=0.001)
         assert np.ptp(to_m + from_m) < 1e-9
-    # 0.3 m into the first pass.
     row = np.argmin(np.abs(path.position_m[path.stroke == 0, 0] - 0.3))
     assert path.from_turn_m[row] == pytest.approx(0.3, abs=0.005)
-
-
-def test_trembling_at_rest_is_no_turn():
-    times = np.arange(0.0, 3.0, 0.01)
-    still = level(times, np.zeros((len(times), 2)), noise_m=2e-4, seed=5)
-    assert spray_path(still)[0].stroke[-1] == 0
 
 
 def test_strokes_do_not_depend_on_where_the_part_stands():
@@ -281,14 +277,11 @@ def test_a_log_that_is_in_the_file_twice_is_told_from_another_run():
     assert 'another run follows in the file' in line
 
 
-def test_poses_dropped_for_rounded_stamps_are_warned_of():
+def test_stamps_that_are_rounded_or_milliseconds_taken_for_seconds_are_told():
     rounded = replace(WHOLE, stamps_ns=WHOLE.stamps_ns // 10**8 * 10**8)
     (line,) = checked_path(rounded, 0.25)[2]
     assert line.startswith('400 of 500 poses dropped, for they repeat the stamp before them')
     assert checked_path(WHOLE, 0.25)[2] == ()
-
-
-def test_milliseconds_that_are_taken_for_seconds_are_suggested():
     slow = replace(WHOLE, stamps_ns=1000 * (WHOLE.stamps_ns - WHOLE.stamps_ns[0]))
     with pytest.raises(RecordingError, match=r'they are 20 s apart: if these are milliseconds'):
         checked_path(slow, 0.25)

@@ -18,10 +18,8 @@ from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.motion.trajectory import Trajectory
 
 TIMES_S = np.arange(0.0, 4.0, 0.02)
-TRIGGER = {
-    'trigger_stamps_ns': scenes.stamps_ns([0.0, 0.5037, 1.9, 2.4, 3.3]),
-    'trigger_flow': np.array([0.0, 1.0, 0.0, 0.7, 0.0]),
-}
+CHANGES_NS = scenes.stamps_ns([0.0, 0.5037, 1.9, 2.4, 3.3])
+TRIGGER = {'trigger_stamps_ns': CHANGES_NS, 'trigger_flow': np.array([0.0, 1.0, 0.0, 0.7, 0.0])}
 
 
 def add_rows(builder, trajectory, rows):
@@ -151,9 +149,8 @@ def test_time_and_way_are_kept(seed, cuts):
     stamps, positions, quaternions = random_motion(seed)
     span = stamps[-1] - stamps[0]
     cuts_ns = np.unique(stamps[0] + np.round(np.array(cuts) * span).astype(np.int64))
-    stamp, dwell, position, rotation, velocity, after_gap = split(
-        stamps, positions, quaternions, cuts_ns
-    )
+    found = split(stamps, positions, quaternions, cuts_ns)
+    stamp, dwell, position, rotation, velocity, after_gap = found
     assert dwell.sum() == pytest.approx(span * 1e-9, rel=1e-12)
     assert np.all(dwell > 0.0)
     assert np.all(np.diff(stamp) > 0)
@@ -164,8 +161,7 @@ def test_time_and_way_are_kept(seed, cuts):
     # Velocity times dwell, put end to end, is the way from the first pose to the last.
     way = (velocity * dwell[:, np.newaxis]).sum(axis=0)
     assert np.allclose(way, positions[-1] - positions[0], rtol=0, atol=1e-12)
-    # At the middle of each sub-step, which is stamped to the nanosecond: on the straight line,
-    # evenly turned.
+    # Sub-steps are stamped to the nanosecond: on the straight line, evenly turned.
     at = stamp * 1e-9
     for axis in range(3):
         expected = np.interp(at, stamps * 1e-9, positions[:, axis])
@@ -210,13 +206,10 @@ def test_poses_are_passed_over_until_half_a_sub_step_is_travelled(rate_hz):
     assert np.all(travel < 0.5 * STEP_M + 0.3 / rate_hz + 1e-12)
 
 
-def test_a_gun_that_stands_still_is_followed_twenty_times_a_second():
+def test_a_gun_that_stands_still_is_followed_twenty_times_a_second_and_no_gap_arises():
     times = np.arange(0.0, 2.0, 0.004)
     assert np.allclose(np.diff(times[followed(times, 0.7)]), 0.052)
-
-
-def test_no_gap_arises_between_poses_far_apart_in_time():
-    """Each comes within the longest interval; two together would not."""
+    # Each comes within the longest interval; two together would not.
     times = np.array([0.0, 0.04, 0.28, 0.32, 0.5])
     assert np.all(np.diff(times[followed(times, 0.0)]) < 1e-9 * GAP_NS)
 

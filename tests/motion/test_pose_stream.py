@@ -179,20 +179,16 @@ def test_the_speed_is_that_of_the_last_fifth_of_a_second(batch):
         speed.add(STAMPS_NS[rows], positions[rows])
     # 27 steps at the first speed, 23 at the second.
     assert speed.m_per_s == pytest.approx((27 * 0.5 + 23 * 0.2) / 50, rel=1e-9)
-    # Another stream begins anew.
     speed.add(STAMPS_NS[:2], along(np.full(1, 0.3)))
     assert speed.m_per_s == pytest.approx(0.3, rel=1e-9)
 
 
-def test_shapes_must_match():
+def test_shapes_must_match_and_flows_be_possible():
     stamps = np.arange(3, dtype=np.int64)
     with pytest.raises(RecordingError, match=r'3 stamps .*positions \(2, 3\)'):
         Trajectory(stamps, np.zeros((2, 3)), np.zeros((3, 4)))
     with pytest.raises(RecordingError, match='2 trigger stamps go with 1 flow'):
         Trajectory(stamps, np.zeros((3, 3)), np.zeros((3, 4)), '', np.arange(2), np.array([1.0]))
-
-
-def test_relative_flow():
     assert relative_flow(False, 0.9) == 0.0
     assert relative_flow(True) == 1.0
     assert relative_flow(True, 0.9) == 0.9

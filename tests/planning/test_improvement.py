@@ -76,7 +76,6 @@ def test_speed_takes_away_what_an_effect_lays_too_much(levelled):
     slope, level = np.polyfit(places[inside, 0], speed[inside], 1)
     # 1 + h rises by 0.5 a metre.
     assert slope / level == pytest.approx(0.5, rel=0.2)
-    # The mean stays, and the path too.
     assert levelled.after.mean_um == pytest.approx(levelled.before.mean_um, rel=3e-3)
     original, new = levelled.original.positions_m, levelled.trajectory.positions_m
     assert cKDTree(original).query(new)[0].max() < 0.004
@@ -92,7 +91,6 @@ def test_a_target_is_met_and_paint_used_is_flow_times_time(panel, even):
     assert better.after.paint_cm3 == pytest.approx(1.0 * path.spraying_time_s, rel=1e-9)
     opened = better.trajectory.trigger_flow[better.trajectory.trigger_flow > 0.0]
     assert np.all((opened >= 0.8 - 1e-6) & (opened <= 1.2 + 1e-6))
-    # The same flows are in the robot program.
     in_program = np.unique(np.round([m.flow for m in better.moves if m.spraying], 4))
     np.testing.assert_allclose(in_program, np.unique(np.round(opened, 4)))
     assert better.program_difference < 1e-3
@@ -269,9 +267,6 @@ def test_gaps_between_poses_close_the_gun_and_flows_are_averaged():
     flows = switched(stamps_ns([0.5, 1.5, 2.0]), (1.0, 1), (0.4, 1), (0, 0))
     (opening,) = Programme.of(replace(SWITCHED, **flows)).openings
     assert opening.flow == pytest.approx(0.8)
-
-
-# --- films that are to be on the targets of their zones
 
 
 def zone(name, target_um, tolerance_um, low_x=-1.0, high_x=1.0):

@@ -7,7 +7,6 @@ import pytest
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.planning.placement import place_passes
@@ -20,7 +19,7 @@ from surfaces import sheet
 
 pytestmark = pytest.mark.slow
 
-NARROW = DepositionModel(
+NARROW = pd.DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.1, r_m=0.1, sigma1_m=0.042, sigma2_m=0.07)
 )
 

@@ -40,7 +40,6 @@ def test_every_local_minimum_is_found_and_the_deepest_recommended():
         assert minimum.sigma_n == pytest.approx(sigma_n(SYMMETRIC, minimum.index_m), rel=1e-9)
         for aside in (-1e-4, 1e-4):
             assert minimum.sigma_n <= sigma_n(SYMMETRIC, minimum.index_m + aside)
-    # Without a tolerance the deepest is recommended.
     assert answer.sigma_n == min(m.sigma_n for m in answer.minima)
     assert answer.index_drift_m is None
 

@@ -13,7 +13,6 @@ from matplotlib.image import imread
 
 import paint_deposition as pd
 from booth import door, panel, serpentine
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.comparison.comparison import compare
@@ -21,7 +20,6 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.part.surface import Surface
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import report_html
 from paint_deposition.report.pictures.film import film_picture
@@ -152,11 +150,11 @@ def folded(spacing_m):
     return triangulated(lambda x, z: 0.2 * x**2 + 0.9 * np.abs(z - 0.03), spacing_m, jitter=0.2)
 
 
-def test_what_is_seen_is_drawn_over_what_it_hides():
+def test_what_is_seen_is_drawn_over_what_it_hides_and_edges_are_outline_and_fold():
     vertices, faces = folded(0.02)
     behind = vertices + np.array([0.15, 0.4, 0.05])
     both = np.concatenate([faces, faces + len(vertices)])
-    surface = Surface.from_triangles(np.concatenate([vertices, behind]), both, 0.05)
+    surface = pd.Surface.from_triangles(np.concatenate([vertices, behind]), both, 0.05)
     picture = PartPicture.of(surface)
     assert 0.5 < picture.seen.mean() < 0.9
     middle = surface.vertices_m[picture.faces].mean(axis=1)
@@ -167,11 +165,8 @@ def test_what_is_seen_is_drawn_over_what_it_hides():
     assert (rows == np.flatnonzero(picture.seen)).all()
     far = (middle @ picture.view.toward)[~picture.seen]
     assert far.max() < (middle @ picture.view.toward)[picture.seen].max()
-
-
-def test_edges_are_those_of_the_outline_and_the_fold_alone():
     vertices, faces = folded(0.01)
-    picture = PartPicture.of(Surface.from_triangles(vertices, faces, 0.05))
+    picture = PartPicture.of(pd.Surface.from_triangles(vertices, faces, 0.05))
     assert 0 < len(picture.edges_m) < 400
 
 
@@ -186,7 +181,7 @@ def test_a_point_is_labelled_beside_what_is_written_there():
 @pytest.mark.slow
 def test_thicker_columns_are_not_cut_off_by_a_thin_one(tmp_path):
     study = Study.of(small_campaign(tmp_path, experiments=('door',), style='columns'))
-    data = ReportData((compare(study, DepositionModel()),))
+    data = ReportData((compare(study, pd.DepositionModel()),))
     thin = data.profiles[0]
     thick = replace(thin, lines_um=2.0 * thin.lines_um)
     vars(data)['profiles'] = [thin, thick]

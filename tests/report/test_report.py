@@ -13,7 +13,6 @@ from PIL import Image
 from chromium import CHROMIUM, Chromium
 from paint_deposition.effects.catalogue import EFFECTS, learned_law
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.comparison.profiles import profiles_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
@@ -33,7 +32,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures('undrawn')]
 def diagnosis(tmp_path_factory):
     """What a diagnosis that is sure of a draught would say."""
     campaign = small_campaign(tmp_path_factory.mktemp('campaign'))
-    found = refit(campaign, DepositionModel(), AirDrift)
+    found = refit(campaign, DepositionModel(), EFFECTS['air_drift'])
     sure = replace(found.classes[0], probability=0.97)
     return replace(found, verdict='effect_missing', classes=(sure,), library=EFFECTS)
 
@@ -53,10 +52,7 @@ def proposals(diagnosis):
 
 @pytest.fixture(scope='module')
 def tell(comparisons):
-    """`tell(diagnosis)`: the report of one whose comparisons and proposals are known already.
-
-    The films on its parts are those of the same models, and painted once.
-    """
+    """`tell(diagnosis)`: the report of one whose comparisons and films are known already."""
     painted = ReportData(comparisons).painted
 
     def tell(told, beside=comparisons, proposals=((), ()), older=()) -> str:
@@ -188,7 +184,6 @@ def test_every_verdict_has_its_report(tell, diagnosis, comparisons, which):
         ('agrees with the readings', 'none_missing', base),
         ('cannot be trusted', 'fit_broken', base | broken),
         ('do not say which', 'undecided', base | {'classes': (drift, fog)}),
-        # What it was sure of was added, and more is left.
         ('more is, most likely fog gradient (or TCP tilt) (40 %).', 'undecided',
          {'classes': (diagnosis.classes[0], fog)}),
         ('no known effect explains', 'unknown_effect', {}),
@@ -260,7 +255,6 @@ def test_a_browser_draws_every_chart_without_errors(report, comparisons, tmp_pat
         assert tab.evaluate(SORTED_BY_DEVIATION) == sorted(comparisons[-1].points.residual_um)
         tab.evaluate(f"{FOLD}.open = false; location.hash = '#model'")
         tab.wait_until(f'{FOLD}.open')
-        # Charts follow the width of the window.
         size = {'width': 390, 'height': 844, 'deviceScaleFactor': 1, 'mobile': False}
         tab.call('Emulation.setDeviceMetricsOverride', **size)
         tab.wait_until(f'innerWidth === 390 && !{TOO_WIDE}')

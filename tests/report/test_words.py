@@ -30,7 +30,7 @@ class HoleBuild(Effect):
     )
 
 
-def test_the_unit_in_a_parameters_name_is_not_said_twice():
+def test_units_are_not_said_twice_and_numbers_have_no_computers_exponent():
     wake = load_effect_file(SAMPLES / 'my_effect.py')
     unit = wake.parameters()['loss_per_m_per_s']['unit']
     assert words.parameter_words('loss_per_m_per_s', unit) == 'loss'
@@ -40,6 +40,8 @@ def test_the_unit_in_a_parameters_name_is_not_said_twice():
     told = {'drift_per_pass': (unit, 'drift'), 'shift_down_m': ('m', 'shift down')}
     for name, (unit, expected) in (told | {'gain': ('1', 'gain'), 's': ('s', 's')}).items():
         assert words.parameter_words(name, unit) == expected
+    found = [words.number(value) for value in (0.0, 1234.0, -0.00012345, 2.5e-9, 4e8)]
+    assert found == ['0', '1234', '−0.000123', '2.5 × 10⁻⁹', '4 × 10⁸']
 
 
 def test_an_effect_without_a_docstring_is_told_by_its_signature_or_its_parameter():
@@ -47,11 +49,6 @@ def test_an_effect_without_a_docstring_is_told_by_its_signature_or_its_parameter
     signed = type('Signed', (HoleBuild,), {'signature': 'more paint around holes'})
     assert words.effect_meaning(signed) == 'More paint around holes.'
     assert words.effect_meaning(FlowDrift) == FlowDrift.__doc__.splitlines()[0]
-
-
-def test_numbers_have_no_computers_exponent():
-    found = [words.number(value) for value in (0.0, 1234.0, -0.00012345, 2.5e-9, 4e8)]
-    assert found == ['0', '1234', '−0.000123', '2.5 × 10⁻⁹', '4 × 10⁸']
 
 
 def test_learned_laws_are_told_by_what_they_depend_on():

@@ -1,7 +1,4 @@
-"""Eqs. (1) and (2) of Conner et al. (2002) by plain quadrature: the yardstick of the tests alone.
-
-The generator never calls this; a clean film must agree with it.
-"""
+"""Eqs. (1) and (2) of Conner et al. (2002) by plain quadrature, which a clean film follows."""
 
 from __future__ import annotations
 

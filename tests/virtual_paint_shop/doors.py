@@ -11,10 +11,9 @@ OUTLINE_MARGIN_M = 0.15
 
 @dataclass(frozen=True)
 class Bend:
-    """A line along which the surface's slope changes by `slope`, spread over about 4 x `soft_m`.
+    """A line along which the slope changes by `slope`, spread over about 4 x `soft_m`.
 
-    The surface moves by slope x distance on the side where direction x (coordinate - at) > 0;
-    slope < 0 falls away from the gun (convex), > 0 comes back to it (concave).
+    The side where direction x (coordinate - at) > 0 falls away from the gun if slope < 0 (convex).
     """
 
     axis: str

@@ -106,10 +106,7 @@ def measure(
     spot: np.ndarray, film_um: np.ndarray, expected_um: np.ndarray, noise: GaugeNoise,
     rng: np.random.Generator,
 ) -> Session:  # fmt: skip
-    """Read a part anew: another part of its kind, in another session.
-
-    All arrays (n,). `spot` names the place of each reading; repeats share it and its texture.
-    """
+    """Read (n,) films of another part in another session; repeats share spot and texture."""
     places, place = np.unique(spot, return_inverse=True)
     level = 1.0 + noise.level * rng.normal()
     offset = noise.session_offset_um * rng.normal()

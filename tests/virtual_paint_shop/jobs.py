@@ -234,9 +234,8 @@ def _in_time(
     time = np.concatenate([[0.0], np.cumsum(np.diff(path) / (0.5 * (speed[1:] + speed[:-1])))])
     across = np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])
     turn = orthonormal(np.stack([np.broadcast_to(across, axis.shape), axis, axis], axis=-1))
-    return Motion(
-        time, tcp, turn, number, reversal, time[trigger], np.arange(trigger.size) % 2 == 0
-    )
+    opens = np.arange(trigger.size) % 2 == 0
+    return Motion(time, tcp, turn, number, reversal, time[trigger], opens)
 
 
 def _steps(tcp_m: np.ndarray) -> np.ndarray:

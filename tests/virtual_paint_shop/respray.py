@@ -38,10 +38,8 @@ def respray(
 ) -> Experiment:  # fmt: skip
     """Paint another part like that of an experiment, with changes, and measure the same points.
 
-    stand: where the gun stands still instead of running its passes (x_m, y_m, z_m), how far off
-    (standoff_m) and how long it is open (dwell_s). The hidden effects and the bell are the same;
-    teaching, the part's level, the gauge's zero and its noise are drawn anew. Raises ValueError
-    for a change that the shop cannot do.
+    stand: where the gun stands (x_m, y_m, z_m), how far off (standoff_m), how long open (dwell_s).
+    Teaching, level, zero and noise are drawn anew; the hidden effects and the bell are the same.
     """
     rng = stream(seed, 60)
     part, plan = experiment.part, experiment.plan

@@ -89,11 +89,7 @@ def panel_study(
     seed: int, index_m: float = 0.577, *, readings: int = 75, repeats: int = 15,
     parcels: int = PARCELS,
 ) -> Campaign:  # fmt: skip
-    """A flat panel, three passes at `index_m`; the bell depends on the seed alone.
-
-    It is a 50 mm bell like the paper's (SB50 near 0.57 m) at about the standoff of the model
-    plane, its speed by mass balance for a mean film of 20 um at 0.577 m.
-    """
+    """A flat panel, three passes of a bell (SB50 near 0.57 m), 20 um of film at 0.577 m."""
     rng = stream(seed, 11)
     pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng), 0.05)
     speed = pattern.K1_cm3_per_s / (20.0 * 0.577)

@@ -1,8 +1,6 @@
 """What a hidden effect can change, and the register of all of them.
 
-A truth acts on the parcels' way: the plume they leave in, the gun's true motion and flow, the air
-they fly through, whether they stay where they land, what the wet film does, what the gauge says.
-Amplitudes are in the units of the effect's usual parameter; they are drawn as typical x U(0.7, 2).
+Amplitudes are in the units of the effect's usual parameter, drawn as typical x U(0.7, 2).
 An effect may have several laws: classes with one `id` and each its own `form`.
 """
 
@@ -55,9 +53,7 @@ class Truth:
     gun = None  # where the gun must open, so that the effect can occur at all
 
     @classmethod
-    def draw(
-        cls, rng: np.random.Generator, amplitude: float | None = None, scale: float = 1.0
-    ) -> Truth:
+    def draw(cls, rng: np.random.Generator, amplitude: float | None = None, scale=1.0) -> Truth:
         """A truth of physics-typical size, or of the given amplitude."""
         signed = cls.of_size(scale * rng.uniform(0.7, 2.0), rng)
         return cls(signed if amplitude is None else amplitude, cls.details(rng))

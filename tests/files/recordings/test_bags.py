@@ -117,13 +117,16 @@ def test_a_state_that_sprays_with_flow_0_is_noted(tmp_path):
     assert 'trigger /state says spraying with flow 0, which lays no paint' in recorded.notes[0]
 
 
-def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
+def test_poses_without_stamps_and_a_bool_on_another_clock_are_refused(tmp_path):
     written, hour_ns = straight_pass(triggers=False), 3_600 * 10**9
     entries = pose_entries(written, delay_ns=hour_ns)
     entries += [('/gun', START_NS + hour_ns, Messages().trigger(True))]
     folder = write_bag(tmp_path / 'other_clock', sorted(entries, key=lambda entry: entry[1]))
     assert len(pd.read_recording(folder)) == len(written)
     assert '3.6e+03 s off its own stamps' in refusal(folder, None, '/gun')
+    messages = Messages()
+    entries = [('/p', START_NS + k, messages.pose(0, (0, 0, 0), (0, 0, 0, 1))) for k in range(3)]
+    assert 'all 3 poses on /p' in refusal(write_bag(tmp_path / 'unstamped', entries))
 
 
 @pytest.mark.parametrize(
@@ -189,17 +192,10 @@ def test_poses_of_several_frames_are_brought_to_the_part(tmp_path):
     for row, frame in poses:
         pose = messages.pose(written.stamps_ns[row], seen[0][row], seen[1][row], frame)
         entries[row] = (*entries[row][:2], pose)
-    read = pd.read_recording(
-        write_bag(tmp_path / 'few', [('/tf_static', START_NS, static), *entries])
-    )
+    few = write_bag(tmp_path / 'few', [('/tf_static', START_NS, static), *entries])
+    read = pd.read_recording(few)
     assert read.stamps_ns.tolist() == written.stamps_ns[[0, 19]].tolist()
     assert np.allclose(read.positions_m, written.positions_m[[0, 19]], atol=1e-12)
-
-
-def test_poses_without_stamps_are_refused(tmp_path):
-    messages = Messages()
-    entries = [('/p', START_NS + k, messages.pose(0, (0, 0, 0), (0, 0, 0, 1))) for k in range(3)]
-    assert 'all 3 poses on /p' in refusal(write_bag(tmp_path / 'unstamped', entries))
 
 
 def test_an_unfinished_file_says_how_to_recover_it(tmp_path):
@@ -218,9 +214,8 @@ def test_a_part_of_a_split_bag_is_not_taken_for_the_whole(tmp_path):
     """A recorder that is killed has not named its last file; a single file may be named."""
     folder = write_pose_bag(tmp_path / 'pass', straight_pass(500))
     shutil.copy(folder / 'pass_0.mcap', folder / 'pass_1.mcap')
-    assert refusal(folder).endswith(
-        f'metadata.yaml does not name pass_1.mcap); run: paint recover {folder}'
-    )
+    said = f'metadata.yaml does not name pass_1.mcap); run: paint recover {folder}'
+    assert refusal(folder).endswith(said)
     metadata = folder / 'metadata.yaml'
     both = re.sub(r'(\s*- )pass_0.mcap', r'\1pass_0.mcap\1pass_1.mcap', metadata.read_text())
     metadata.write_text(both)
@@ -239,14 +234,11 @@ def test_a_file_has_the_custom_data_of_its_folder_alone(tmp_path):
     assert (len(other), len(other.trigger_flow)) == (50, 0)
 
 
-def test_damaged_metadata_beside_a_file_is_no_traceback(tmp_path):
+def test_damaged_metadata_and_other_files_under_a_bags_name_are_no_traceback(tmp_path):
     told = {'messages_of_the_part': '/atomizer/pose=seven'}
     folder = write_pose_bag(tmp_path / 'run', straight_pass(5), told)
     assert 'run_0.mcap is damaged (invalid literal' in refusal(folder / 'run_0.mcap')
-
-
-def test_other_files_under_a_bags_name(tmp_path):
-    """A cut ROS 1 bag is damaged likewise."""
+    # A cut ROS 1 bag is damaged likewise.
     for name in ('a.mcap', 'a.db3', 'a.bag'):
         path = tmp_path / name
         path.write_bytes(b'x' * 1000)

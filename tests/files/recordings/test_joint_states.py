@@ -299,10 +299,7 @@ RAIL = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]
 
 
 def tf_bag(path, storage='mcap'):
-    """A rail that carries an arm with a bell: world -> rail -> tool0 -> bell.
-
-    The rail goes evenly at 0.1 m/s and is published at 5 Hz, the arm at 50 Hz, the bell is static.
-    """
+    """A rail (0.1 m/s, 5 Hz) with an arm (50 Hz) and a bell: world -> rail -> tool0 -> bell."""
     messages = Messages(ros1=storage == 'ros1')
     positions, quaternions = tip_poses(sweep())
     stamps = stamps_ns(TIMES_S)

@@ -109,9 +109,8 @@ while True:
 @pytest.mark.slow
 def test_a_killed_process_loses_less_than_a_second(tmp_path, repository):
     run, tests = tmp_path / 'run', repository / 'tests'
-    process = subprocess.Popen(
-        [sys.executable, '-c', WRITE_UNTIL_KILLED, run, tests], stdout=subprocess.PIPE
-    )
+    command = [sys.executable, '-c', WRITE_UNTIL_KILLED, run, tests]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE)
     written_ns = [int(process.stdout.readline()) for _ in range(400)]
     os.kill(process.pid, signal.SIGKILL)
     written_ns += map(int, process.stdout.read().split())
@@ -153,10 +152,8 @@ with RunWriter(sys.argv[1], compression='none') as writer:
 def test_the_first_refused_write_is_the_last(tmp_path, repository):
     """A limit on the file's size fails exactly as a full disk: some bytes, then an error."""
     run = tmp_path / 'run'
-    process = subprocess.run(
-        [sys.executable, '-c', WRITE_UNTIL_REFUSED, run, repository / 'tests'],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    command = [sys.executable, '-c', WRITE_UNTIL_REFUSED, run, repository / 'tests']
+    process = subprocess.run(command, capture_output=True, text=True, check=False)
     number, same, message = process.stdout.strip().split('|')
     assert process.returncode != 0
     assert same == 'True'

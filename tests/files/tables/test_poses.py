@@ -126,9 +126,15 @@ def test_times_keep_their_nanoseconds_and_the_minus_of_print(file, heading, cell
     assert read_recording(file('p.csv', '\n'.join(rows))).stamps_ns.tolist() == [stamp, stamp]
 
 
-def test_one_table_is_the_motion_of_one_gun():
+def test_a_second_gun_and_options_of_other_kinds_of_files_are_refused():
     with pytest.raises(RecordingError, match=r'plain\.csv is no bag and has the motion of one'):
         read_gun_motions([LAYOUTS / 'plain.csv'], MotionSource(), ['a', 'b'])
+    with pytest.raises(RecordingError, match='--pose-topic is for bags'):
+        read_recording(LAYOUTS / 'plain.csv', '/pose')
+    with pytest.raises(RecordingError, match="rotation: 'zxq' is no convention; give 'rotvec'"):
+        read_recording(LAYOUTS / 'plain.csv', rotation='zxq')
+    with pytest.raises(RecordingError, match="'ZZX' is no convention"):
+        read_recording(LAYOUTS / 'plain.csv', rotation='ZZX')
 
 
 def test_the_frame_of_the_poses_is_read(file):
@@ -178,12 +184,3 @@ def test_what_cannot_be_read_for_certain_is_refused(text, words, file):
 def test_a_program_that_is_not_read_says_what_to_export(suffix, rotation, file):
     with pytest.raises(RecordingError, match=rf'as a table with x, .* --rotation {rotation}$'):
         read_recording(file(f'door{suffix}', 'DEF door()\nLIN P1\nEND\n'))
-
-
-def test_options_of_other_kinds_of_files_are_refused():
-    with pytest.raises(RecordingError, match='--pose-topic is for bags'):
-        read_recording(LAYOUTS / 'plain.csv', '/pose')
-    with pytest.raises(RecordingError, match="rotation: 'zxq' is no convention; give 'rotvec'"):
-        read_recording(LAYOUTS / 'plain.csv', rotation='zxq')
-    with pytest.raises(RecordingError, match="'ZZX' is no convention"):
-        read_recording(LAYOUTS / 'plain.csv', rotation='ZZX')

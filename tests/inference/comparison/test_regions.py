@@ -96,9 +96,8 @@ def test_residuals_spread_evenly_within_the_radius_on_their_side_the_nearer_the_
 def test_surface_turned_by_more_than_60_deg_is_another_side(plate, angle_deg, same_side):
     angle = np.radians(angle_deg)
     normal = np.array([[np.sin(angle), -np.cos(angle), 0.0]])
-    field = areas.interpolate_over_surface(
-        plate, np.array([[0.5, 0.0, 0.5]]), normal, np.array([2.0])
-    )
+    place, value = np.array([[0.5, 0.0, 0.5]]), np.array([2.0])
+    field = areas.interpolate_over_surface(plate, place, normal, value)
     front = plate.normals[:, 1] < 0
     assert np.isfinite(field[front]).any() == same_side
     assert np.isnan(field[~front]).all()
@@ -135,7 +134,6 @@ def test_a_profile_passes_through_its_readings_and_ends_with_its_part(tmp_path):
         here = np.searchsorted(profile.line_m, profile.position_m)
         for line_um, film_um in zip(profile.lines_um, predicted_um, strict=True):
             assert line_um[here] == pytest.approx(film_um[profile.rows], rel=1e-6, abs=1e-6)
-        # It goes on beyond the outermost readings.
         assert profile.line_m[0] < profile.position_m[0]
         assert profile.position_m[-1] < profile.line_m[-1]
         assert np.ptp(profile.line_m) < np.ptp(part.surface.vertices_m[:, 2]) + 0.01

@@ -9,7 +9,6 @@ from scipy.stats import multivariate_normal
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.inference.design import next_experiment
 from paint_deposition.inference.design.contenders import Forecast, Placement, contenders_of
 from paint_deposition.inference.design.sprays import MENU, together
@@ -38,7 +37,7 @@ def fit(study):
 def drifting(study, fit):
     """The panel as it reads where the air drifts."""
     (panel,) = study.campaign.experiments
-    drifting = fit.model.with_effect(AirDrift(shift_down_m=0.03))
+    drifting = fit.model.with_effect(EFFECTS['air_drift'](shift_down_m=0.03))
     film_um = Forward(study.campaign, drifting.effects).predict_um(drifting)
     noise_um = study.gauge_um * np.random.default_rng(2).normal(size=len(film_um))
     places_m = panel.measured_points.positions_m
@@ -65,9 +64,7 @@ def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drifting, drift_or_to
     # Half a turn of the part in the booth does to the air what half a turn of the gun does to it.
     assert by_changes['upside_down',].separation > 0.8 * rolled.separation
     assert rolled.chance > 0.7
-    # The order of the passes tells nothing of it: it is not among the best.
     assert ('reverse_order',) not in by_changes
-    # One spot will do.
     spot = by_changes['standing', 'roll_180']
     assert spot.separation > 2.0 * spot.now
     told = spot.to_dict()['stand']
@@ -100,7 +97,7 @@ def test_places_lie_on_the_surface_apart_and_off_the_edge(study, fit, drift_or_t
 
 def test_without_voltage_what_needs_it_is_gone(study):
     experiment = BY_KEY['voltage_off'].made(study.campaign.experiments[0])
-    ridge, drift = EFFECTS['convex_attraction'].typical(), AirDrift(shift_down_m=0.03)
+    ridge, drift = EFFECTS['convex_attraction'].typical(), EFFECTS['air_drift'](shift_down_m=0.03)
     left = pd.DepositionModel(effects=(ridge, drift)).without(experiment.switched_off)
     assert left.effect('convex_attraction').is_neutral
     assert left.effect('air_drift') == drift
@@ -159,8 +156,6 @@ def test_all_of_the_leading_group_compete_and_the_shapeless_cause_where_it_does(
         assert next_experiment.with_proposals(diagnosis, EFFECTS).proposals == ((), ())
     assert contenders_of(diagnosed(study, fit, group), {}) == ()
 
-
-# How much further readings tell between explanations, against draws of these readings.
 
 READINGS, DRAWS = 6, 40_000
 

@@ -75,10 +75,8 @@ def test_an_effect_is_measured_where_it_shows():
     part = on_panel('air_drift')
     chosen = choose(part, 12)
     places = grid_places(part.surface, chosen.film_um > 0.2 * chosen.film_um.max(), 12)
-    found, even = (
-        design_at(part, rows).beyond_model(np.arange(12))[2].min()
-        for rows in (chosen.vertices, places)
-    )
+    designs = (design_at(part, rows) for rows in (chosen.vertices, places))
+    found, even = (design.beyond_model(np.arange(12))[2].min() for design in designs)
     assert found > 1.5 * even
     assert chosen.power['air_drift'] > chosen.grid_power['air_drift']
     assert all(effects in ((), ('air_drift',)) for effects in chosen.speaks_for)

@@ -144,7 +144,6 @@ def test_the_footprint_changes_the_readings_by_what_no_pattern_does(alone):
     columns, law = discrepancy.footprint.columns[-1], discrepancy.footprint.laws[-1]
     by_knots = law.change_um / study.sigma_um[:, np.newaxis]
     assert columns[:, :2] == pytest.approx(by_knots[:, :2])
-    # The pattern follows between the knots, too.
     amounts = np.random.default_rng(1).normal(size=columns.shape[1])
     assert np.corrcoef(columns @ amounts, by_knots @ amounts)[0, 1] > 0.95
     fit = at_model(study)

@@ -51,11 +51,10 @@ def size(columns: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ('name', 'values'), [('overspray_fog', {'fog_um': 3.0}), ('air_drift', {'shift_down_m': 0.02})]
+    'effect', [EFFECTS['overspray_fog'](fog_um=3.0), EFFECTS['air_drift'](shift_down_m=0.02)]
 )
-def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(study, name, values):
+def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(study, effect):
     """Over the conditions that the effect names, over all others, and of a law of another form."""
-    effect = EFFECTS[name](**values)
     share = np.abs(change_um(study, effect)) / study.sigma_um
     expected = np.hypot(explanations.LAW_ERROR, explanations.OTHER_ERROR) * share
     assert size(errors(study, effect)) == pytest.approx(expected, rel=0.03)
@@ -104,10 +103,8 @@ def test_where_an_effect_was_off_or_no_paint_lands_its_law_has_no_error(monkeypa
     off = on_door(switched_off=frozenset(['voltage']))
     doors = study_of(on_door(), replace(off, name='without voltage'))
     plate = study_of(plate_with_a_back())
-    for study, none in (
-        (doors, doors.campaign.experiment_of == 1),
-        (plate, plate.forward.predict_um(MODEL) == 0.0),
-    ):
+    bare = plate.forward.predict_um(MODEL) == 0.0
+    for study, none in ((doors, doors.campaign.experiment_of == 1), (plate, bare)):
         found = size(errors(study, EDGE))
         assert none.any()
         assert found[~none].max() > 0.05
@@ -192,29 +189,23 @@ def test_a_curve_made_from_a_form_is_named_with_its_parameters(form, x, unit, cu
     assert sum(held) >= 3
 
 
-def test_an_addition_is_in_micrometres():
+def test_an_addition_is_in_micrometres_and_a_value_below_zero_written_with_a_plus():
     x, sd = np.linspace(0.0, 0.2, KNOTS), np.full(KNOTS, 0.05)
     best = fitting_forms(x, 6.0 * np.exp(-x / 0.05), sd, unit='m', addition=True)[0]
     assert best.name in ('exponential', 'saturating')
     assert best.formula.startswith('addition [um] = ')
     assert 'level_um' in best.parameters
     assert fitting_forms(x, np.zeros(KNOTS), sd, unit='m', addition=True) == ()
-
-
-def test_a_form_about_a_value_below_zero_is_written_with_a_plus():
     x = np.linspace(-4.0, 2.0, KNOTS)
     forms = fitting_forms(x, 0.9 + 0.1 * x, np.full(KNOTS, 0.004), unit='1/m')
     assert any('(x + 1)' in form.formula for form in forms)
     assert not any('- -' in form.code + form.formula for form in forms)
 
 
-def test_a_wiggly_or_flat_curve_has_none():
+def test_a_wiggly_or_flat_curve_has_no_form_and_a_wide_band_leaves_several():
     wave, noise = np.sin(TIME_S / 2.5), np.random.default_rng(1).normal(size=KNOTS)
     for change in (0.1 * wave, 0.3 * wave, 0.003 * noise):
         assert fitting_forms(TIME_S, 1.0 + change, np.full(KNOTS, 0.02), unit='s') == ()
-
-
-def test_a_wide_band_leaves_several_forms_and_says_so():
     forms = fitting_forms(STANDOFF, STANDOFF**-0.5, np.full(KNOTS, 0.04))
     assert len(forms) > 3
     assert forms[0].probability < 0.9

@@ -1,6 +1,7 @@
 """Log Bayes factors in closed form, and laws of any form as changes of readings."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -49,12 +50,9 @@ def test_the_null_model_has_the_covariance_of_all_that_varies(fit, columns, disc
     deviation = fit.residual + fit.jacobian @ (fit.vector - prior.centre)
     assert plain.lower @ plain.lower.T == pytest.approx(covariance)
     rows = np.arange(READINGS) % 3 > 0
-    given, other = (
-        gaussian.NullModel.around(fit, columns, discrepancy=one)
-        for one in (discrepancy, covariance)
-    )
-    beside = plain.beside(np.sqrt(2.0) * columns)
-    for null in (given, other.with_discrepancy(discrepancy), beside):
+    around = partial(gaussian.NullModel.around, fit, columns)
+    other, beside = around(discrepancy=covariance), plain.beside(np.sqrt(2.0) * columns)
+    for null in (around(discrepancy=discrepancy), other.with_discrepancy(discrepancy), beside):
         assert null.lower @ null.lower.T == pytest.approx(covariance + discrepancy)
         assert null.lower @ null.deviation == pytest.approx(deviation)
         part = null.select(rows)
@@ -113,10 +111,8 @@ def test_factor_is_the_ratio_of_densities_whatever_does_not_show(count, freedom)
     assert found.columns.shape[1] == min(count, 12)
     factor = found.log_bayes_factors(data, np.array([0.7]), freedom)[0]
     covariance = np.eye(12) + 0.49 * columns @ columns.T
-    of_one, of_none = (
-        multivariate_t(shape=shape, df=freedom).logpdf(data.T)
-        for shape in (covariance, np.eye(12))
-    )
+    shapes = covariance, np.eye(12)
+    of_one, of_none = (multivariate_t(shape=c, df=freedom).logpdf(data.T) for c in shapes)
     np.testing.assert_allclose(factor, of_one - of_none, rtol=1e-8)
     amounts = found.amplitudes(data[:, 0], np.array([0.7]))[0]
     mean = 0.49 * columns.T @ np.linalg.solve(covariance, data[:, 0])
@@ -216,15 +212,12 @@ def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():
     assert not door.film_um[owner > 0].any()
     assert not panel.film_um[owner == 0].any()
     assert np.array_equal(panel.film_um[owner == 1], panel.film_um[owner == 2])
-    # The laws say so themselves.
     points = [experiment.measured_points for experiment in study.campaign.experiments]
     grids = both.settings['maps']
     assert grids == (*door.settings['maps'], *panel.settings['maps'])
     of_grid = [[grid.is_of(p) for p in points] for grid in grids]
     assert of_grid == [[True, False, False], [False, True, True]]
 
-
-# How well a learned curve is known: its band covers the true one as often as it says.
 
 KNOTS, LENGTH, SIZE = 12, 3.0, 0.1
 FILM_UM, NOISE_UM = 30.0, 0.6

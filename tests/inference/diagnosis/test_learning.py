@@ -59,8 +59,6 @@ def test_a_law_must_say_more_than_what_may_vary_already():
     assert learning.choose_laws(nulls(WAVE).beside(3.0 * CHANGE), [WAVY], np.inf) == []
 
 
-# Three panels of which the passes were painted in three orders.
-
 BASE = pd.DepositionModel()
 THREE = (*ORDERS, (0.7, 0.3, 1.5, 1.1))
 EDGE = EFFECTS['edge_build'](gain=0.8, length_m=0.1)
@@ -73,10 +71,7 @@ def begun(campaign: pd.Campaign, *library: str) -> DiagnosisState:
 
 @pytest.mark.slow
 def test_what_no_law_explains_is_learned_without_the_parts_left_out():
-    """The error is that of learning the law from the other parts and predicting the last.
-
-    The flow rises and levels off, which no effect of the library does.
-    """
+    """The flow rises and levels off, which no effect of the library does."""
     rising = gauged(BASE.with_effect(RISING), seed=2, orders=THREE)
     nothing = Search(begun(rising)).nothing
     over_time = [law for law in nothing.state.nonparametric_laws if law.learns == 'time_s']

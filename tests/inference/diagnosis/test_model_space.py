@@ -58,8 +58,8 @@ def found() -> list[Explanation]:
     return [
         law('air_drift', direction(0.8), direction(0.8), side=0),
         *(
-            law('corner_slowdown', direction(0.9), share=1.0 / 3.0, length_m=length_m)
-            for length_m in (0.05, 0.1, 0.3)
+            law('corner_slowdown', direction(0.9), share=1 / 3, length_m=m)
+            for m in (0.05, 0.1, 0.3)
         ),
         law('edge_build', direction(0.7)),
         law('faraday_shielding', direction(1.2)),
@@ -102,9 +102,8 @@ def few_draws(monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(('size', 'freedom'), [(SMALL, np.inf), (LARGE, 15.0)])
-def test_the_p_value_is_uniform_where_nothing_is_missing(
-    plain, found, discrepancy, freedom, size, few_draws
-):
+@pytest.mark.usefixtures('few_draws')
+def test_the_p_value_is_uniform_where_nothing_is_missing(plain, found, discrepancy, freedom, size):
     def p_values(*known: Sizes) -> np.ndarray:
         spaces = drawn_spaces(plain, found, discrepancy, size, known, freedom)
         return np.array([space.p_value(seed) for seed, space in enumerate(spaces)])
@@ -228,9 +227,8 @@ def test_the_deviation_of_the_footprint_is_told(plain, discrepancy):
 def test_sizes_that_matter_only_beside_an_effect_are_kept(plain, discrepancy):
     """A strong effect that is smooth looks like a large discrepancy as long as it is missing."""
     there, edge = shifted(plain, 6.0 * WAVE), law('edge_build', 6.0 * WAVE)
-    without, with_it = (
-        model_space.probable_hyperparameters(there, discrepancy, e, np.inf) for e in ([], [edge])
-    )
+    kept_of = model_space.probable_hyperparameters
+    without, with_it = (kept_of(there, discrepancy, e, np.inf) for e in ([], [edge]))
     for kept in (without, with_it):
         beyond = [size.is_beyond_nature for size in kept]
         assert {size.footprint for size in kept} == set(range(len(SHARES)))

@@ -70,7 +70,6 @@ def test_a_law_is_learned_with_its_band_and_counts_as_no_named_effect(done):
     before, after = done.history
     assert after.rmse_um < 0.8 * before.rmse_um
     assert after.rmse_um < after.holdout_rmse_um < 0.9 * before.holdout_rmse_um
-    # The band holds the hidden law up to a constant, and is much narrower than it.
     law = done.model.effect('learned:time_s')
     times = np.linspace(law.low, law.high, 50)
     sd = law.deviation(times)
@@ -114,7 +113,6 @@ def test_the_hidden_effect_is_named_and_the_error_falls(tmp_path, undrawn):
     gain = found.classes[0].parameters['gain']
     assert gain.low <= truth['hidden'][0]['amplitude'] <= gain.high
     error = found.to_dict()['rmse_um']
-    # Whole patches are left out, where the edge is and where it is not.
     assert error['holdout_after'] < 0.97 * error['holdout_before']
     assert error['after'] < error['noise_floor'] < error['before']
     pd.write(found, tmp_path / 'd')

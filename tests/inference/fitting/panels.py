@@ -87,10 +87,7 @@ def gauged(
     model: pd.DepositionModel, seed: int, columns: int = 3,
     orders: Sequence[Sequence[float]] = ORDERS[:1],
 ) -> pd.Campaign:  # fmt: skip
-    """Panels painted by a model, two readings a point, with noise and texture as assumed.
-
-    The seed is that of noise and texture; orders are the heights of the passes on each panel [m].
-    """
+    """Panels painted in these orders of heights [m], with noise and texture as assumed."""
     points_m = grid_m(columns, 20, 0.03, 1.97)
     panels = []
     for number, heights_m in enumerate(orders):

@@ -111,6 +111,9 @@ def with_film(panel, film_um, repeats=1, noise_um=0.0):
     return panel.with_readings(readings_at(places, film_um, noise_um, repeats))
 
 
+SIX = slice(10, 16)
+
+
 def in_unit(panel, factor, rows=slice(None)):
     film_um = panel.means.mean_um.copy()
     film_um[rows] /= factor
@@ -121,18 +124,14 @@ def in_unit(panel, factor, rows=slice(None)):
     ('made', 'words'),
     [
         (lambda panel: with_film(panel, panel.means.mean_um[:6]), 'readings at 6 points; .* meas'),
-        (lambda _: painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)),
-         'one side of the passes'),
-        (lambda panel: with_film(panel, np.full(40, 20.0), repeats=2, noise_um=0.7),
-         'no pattern in it'),
+        (lambda _: painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)), 'one side of the'),
+        (lambda panel: with_film(panel, np.full(40, 20.0), 2, noise_um=0.7), 'no pattern in it'),
         (lambda panel: with_film(panel, np.where(np.arange(40) == 7, -4.5, panel.means.mean_um)),
          "point 'P7' reads -4.5 µm; .* zero the gauge"),
         (lambda panel: in_unit(panel, 25.4), 'look like mil, say unit: {thickness: mil}'),
         (lambda panel: in_unit(panel, 1000.0), 'look like mm, say unit: {thickness: mm}'),
-        (lambda panel: in_unit(panel, 25.4, slice(10, 16)),
-         r"6 of the readings in 'thickness_um'.* look like mil, multiply them by 25\.4 or"),
-        (lambda panel: in_unit(panel, 1000.0, slice(10, 16)),
-         '6 of the readings.* look like mm, multiply them by 1000'),
+        (lambda panel: in_unit(panel, 25.4, SIX), r'6 of .* like mil, multiply them by 25\.4'),
+        (lambda panel: in_unit(panel, 1000.0, SIX), '6 of .* like mm, multiply them by 1000'),
     ],
     ids=['few', 'one side', 'even', 'negative', 'mils', 'mm', 'six in mils', 'six in mm'],
 )  # fmt: skip
@@ -142,8 +141,6 @@ def test_readings_that_determine_nothing_or_are_in_another_unit_are_refused(pane
     assert '\n' not in str(refusal.value)
     assert re.search(words, str(refusal.value))
 
-
-# Panels too small for the pattern are noticed, and the uncertainty is made honest.
 
 WIDE = PlanarPattern(
     K1_cm3_per_s=1.6, K2=0.15, K3=0.2, phi_rad=0.6, r_m=0.22, sigma1_m=0.09, sigma2_m=0.15
@@ -210,9 +207,7 @@ def test_a_panel_too_small_is_named_and_the_widened_intervals_hold_the_truth(sma
     file = read_model_file(tmp_path / 'model.yaml')
     np.testing.assert_allclose(file.posterior.matrix, found.posterior.matrix, rtol=1e-6)
     assert file.uncertainty['planar']['r_m'] == pytest.approx(widths['r_m'], rel=0.01)
-
-
-def test_a_comparison_with_a_pattern_fitted_to_such_a_panel_warns(small):
+    # A comparison with a pattern that was fitted to such a panel warns, too.
     (warning,) = pd.compare(small).warnings
     assert 'the edges of the pattern are extrapolated' in warning
     assert pd.compare(small, pd.DepositionModel(planar=WIDE)).warnings == ()

@@ -69,20 +69,14 @@ def test_a_slip_is_found_whatever_is_missing(missing, by_um):
     assert list(find_outliers(slipped(misfit, row, by_um), EVERY)) == [row]
 
 
-@pytest.mark.parametrize(
-    ('rows', 'found'), [((3, 30, 60), {3, 30, 60}), (range(0, 96, 10), set())]
-)
-def test_slips_do_not_hide_each_other_and_many_are_none(rows, found):
+def test_slips_do_not_hide_each_other_and_many_and_those_read_again_are_none():
     """Where a tenth of all readings is off, the model is at fault and not the pen."""
-    misfit = scattered(1)
-    for row in rows:
-        misfit = slipped(misfit, row, 9.0 * FILM_UM)
-    assert set(find_outliers(misfit, EVERY)) == found
-
-
-def test_a_point_that_was_read_again_is_no_slip():
-    again = EVERY.copy()
-    again[5] = False
+    for rows, found in (((3, 30, 60), {3, 30, 60}), (range(0, 96, 10), set())):
+        misfit = scattered(1)
+        for row in rows:
+            misfit = slipped(misfit, row, 9.0 * FILM_UM)
+        assert set(find_outliers(misfit, EVERY)) == found
+    again = np.arange(COUNT) != 5
     assert find_outliers(slipped(scattered(2), 5, 9.0 * FILM_UM), again) == {}
 
 
@@ -154,9 +148,7 @@ def test_a_thick_film_without_texture_is_no_broken_fit():
     assert study.noise_figures['texture_source'] == 'neighbours'
     (note,) = study.notes
     assert note.startswith("The film's own texture is 0.")
-
-
-def test_an_assumed_noise_leaves_the_texture_assumed():
+    # An assumed noise leaves the texture assumed.
     experiment = painted_by(MODEL, passes([0.55, 1.35]), grid_m(), repeats=1)
     study, _ = cleaning.clean_and_fit(pd.Campaign((experiment,)), MODEL, starts=1)
     assert study.texture_share == 0.01

@@ -98,8 +98,6 @@ def test_other_settings_of_the_process_are_told(panel):
         assert jobs.prior_for(posterior, thicker(panel, **settings)) == (posterior, ())
 
 
-# How far a pattern moved from the calibration.
-
 FIT = linear_fit(np.random.default_rng(0), 20, parameters=KNOWN)
 PRIOR = KNOWN.prior
 
@@ -160,13 +158,10 @@ def test_draws_near_a_bound_follow_the_truncated_normal():
         assert values.std() == pytest.approx(told.std(), rel=4.0 / (2 * COUNT) ** 0.5)
 
 
-def test_the_asymmetry_of_a_draw_is_at_most_one():
+def test_a_draw_is_within_its_bounds_or_refused():
     wide = known({'K3_cos_phi': 0.7}, {'K3_cos_phi': 0.3, 'K3_sin_phi': 0.6})
     asymmetry = np.array([model.planar.K3 for model in draw_models(MODEL, wide, COUNT, seed=2)])
     assert len(np.unique(asymmetry)) == COUNT
     assert asymmetry.max() <= 1.0
-
-
-def test_a_posterior_that_is_nowhere_physical_is_refused():
     with pytest.raises(ModelError, match='posterior: of 1000 draws 0 are within the bounds'):
         draw_models(MODEL, known({'K2': -0.5}, {'K2': 0.01}), 1, seed=3)

@@ -9,7 +9,6 @@ import paint_deposition as pd
 from inference.diagnosis.linear import fit_linear
 from inference.fitting.panels import gauged, grid_m, painted_by, passes, reading
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.inference.fitting import random_effects as effects
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
@@ -62,12 +61,19 @@ def test_a_level_and_a_zero_come_back_with_their_uncertainty():
     assert study.residuals(0.97 * film_um).residual_um == pytest.approx(0.03 * film_um)
 
 
-def test_sessions_run_across_parts_and_those_without_a_name_are_their_own():
+def test_sessions_run_across_parts_and_two_on_one_part_differ_by_their_zero():
     study = study_of(part('left', 'Monday'), part('right', 'Monday'), part('roof'))
     level, zero = study.random_effects
     assert level.names == ('left', 'right', 'roof')
     assert zero.names == ('Monday', 'roof')
     assert study.nuisance.shape == (len(study), 5)
+    evening = np.arange(40) % 2 == 0
+    study = study_of(part('door', np.tile(np.where(evening, 'evening', 'noon'), 2)))
+    (zero,) = study.random_effects
+    assert zero.kind == 'gauge zero'
+    found = estimated(study, np.where(evening, 0.5, -0.5))
+    assert found['gauge zero', 'evening'].value == pytest.approx(0.5, abs=0.1)
+    assert found['gauge zero', 'noon'].is_notable
 
 
 def test_a_part_without_voltage_has_a_level_of_its_own():
@@ -94,27 +100,14 @@ def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves():
     assert not level.columns[owner == 1].any()
     # Its readings without a name of their session were taken in one of their own.
     assert zero.mixing == pytest.approx(SESSION_UM * others)
-    # One that is left has nothing that it could differ from.
     assert effects.random_effects(*known, owner == 0) == ()
 
-
-def test_two_sessions_on_one_part_differ_by_their_zero():
-    evening = np.arange(40) % 2 == 0
-    study = study_of(part('door', np.tile(np.where(evening, 'evening', 'noon'), 2)))
-    (zero,) = study.random_effects
-    assert zero.kind == 'gauge zero'
-    found = estimated(study, np.where(evening, 0.5, -0.5))
-    assert found['gauge zero', 'evening'].value == pytest.approx(0.5, abs=0.1)
-    assert found['gauge zero', 'noon'].is_notable
-
-
-# The error on parts left out is that of really refitting without them.
 
 BASE = pd.DepositionModel()
 # Heights of the passes on each panel [m], and how much more paint it got than the model says.
 PASSES_M = ((0.3, 1.1, 0.7, 1.5), (1.6, 0.6, 1.1), (0.2, 1.0, 1.8))
 LEVELS = (1.03, 0.97, 1.04)
-MISSING = BASE.with_effect(EdgeBuild(gain=1.0, length_m=0.08))
+MISSING = BASE.with_effect(EFFECTS['edge_build'](gain=1.0, length_m=0.08))
 
 
 def levelled(truth: pd.DepositionModel) -> pd.Campaign:
@@ -148,7 +141,6 @@ def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth
     found, anew = (root_mean_square(np.concatenate(each)) for each in (found_um, anew_um))
     assert step.holdout_rmse_um == pytest.approx(found)
     assert step.holdout_rmse_um == pytest.approx(anew, rel=0.02)
-    # The level of a part is not known beforehand.
     assert step.holdout_rmse_um > step.rmse_um
 
 
@@ -163,10 +155,8 @@ def test_a_level_that_no_other_part_tells_is_no_error_on_a_part_left_out():
     found = study.errors_left_out_um(lambda out: study.predicted_without_um(fit, out))
     owner = study.campaign.experiment_of
     usual = owner != 2
-    others = [
-        (study.measured_um - study.predicted_without_um(fit, owner == k))[owner == k]
-        for k in (0, 1)
-    ]
+    without = study.predicted_without_um
+    others = [(study.measured_um - without(fit, owner == k))[owner == k] for k in (0, 1)]
     squares = np.sum(usual) * root_mean_square(np.concatenate(others)) ** 2
     expected = np.sqrt((squares + np.sum(~usual) * anew**2) / len(study))
     assert found == pytest.approx(expected, rel=0.03)

@@ -116,15 +116,12 @@ def test_what_is_left_out_is_named():
     assert other.startswith("point 'b': 4 µm beside 20, 20.5; left out of the fit")
 
 
-def test_repeats_are_averaged_in_order_of_first_appearance():
+def test_repeats_are_averaged_in_order_and_one_label_at_two_places_is_refused():
     means = PointMeans.of(at_points('bacabb', [10.0, 20.0, 30.0, 22.0, 13.0, 16.0]))
     assert means.first.tolist() == [0, 1, 2]
     assert means.repeats.tolist() == [3, 2, 1]
     assert means.mean_um.tolist() == [13.0, 21.0, 30.0]
     assert means.owner.tolist() == [0, 1, 2, 1, 0, 0]
-
-
-def test_one_label_at_two_places_is_refused():
     places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.02], [0.0, 0.0, 0.05]])
     labels = np.array(['A', 'A', 'A'])
     require_repeats_close(pd.Readings.of(places[:2], [1.0, 2.0], point=labels[:2]))
@@ -140,10 +137,7 @@ def test_without_scatter_to_go_by_the_usual_noise_is_assumed():
 
 
 def test_noise_is_pooled_within_points_beside_those_whose_noise_is_stated():
-    """At zero film the usual gauge's noise is its floor: pooling is the textbook formula.
-
-    A precise instrument for some points must not make the gauge look precise.
-    """
+    """At zero film it is the textbook formula; a precise instrument does not make the gauge so."""
     values = np.array([-1.0, 0.3, 0.7, 1.2, -1.2, 0.5, 0.1, -0.6, 0.0])
     noise = gauge_noise(at_points('aaabbbccc', values))
     squares = sum(np.var(values[k : k + 3], ddof=1) * 2 for k in (0, 3, 6))
@@ -233,7 +227,6 @@ X, Z = np.linspace(-0.4, 0.4, 9), np.linspace(-0.4, 0.4, 8)
         # Rows serve where there are no columns.
         (np.concatenate([grid(X, [0.2]), grid(X + 0.043, [-0.1])]), [('row 1', 9), ('row 2', 9)]),
         (grid([0.1], np.linspace(-0.4, 0.4, 12), 0.004), [('column 1', 12)]),
-        # A stray belongs to no line.
         (np.vstack([grid([-0.3, 0.3], Z), [[0.05, 0.0, 0.33]]]),
          [('column 1', 8), ('column 2', 8), ('', 1)]),
         *((np.random.default_rng(seed).uniform(-0.4, 0.4, (40, 3)) * [1.0, 0.0, 1.0], [('', 40)])

@@ -34,7 +34,7 @@ def test_a_foot_keeps_off_edges_and_does_not_stand_on_a_bend():
     assert can_stand(folded(0.1))[np.abs(x) < 0.005].any()
 
 
-def test_spread_places_are_about_as_many_as_wanted_and_apart():
+def test_spread_places_are_about_as_many_as_wanted_and_apart_and_those_of_a_grid_exactly():
     surface = panel()
     usable = surface.vertices_m[:, 0] > 0.0
     rows = spread_places(surface, usable, 100, seed=1)
@@ -43,9 +43,6 @@ def test_spread_places_are_about_as_many_as_wanted_and_apart():
     positions = surface.vertices_m[rows]
     distance = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2) + np.eye(len(rows))
     assert distance.min() > 0.05
-
-
-def test_a_grid_has_the_points_asked_for():
     surface = panel()
     rows = grid_places(surface, can_stand(surface), 25)
     assert len(set(rows)) == 25

@@ -84,9 +84,7 @@ def factor_at(effect, x: np.ndarray) -> np.ndarray:
         ('edge_distance_m', 'levelling off', 'addition'),
     ],
 )
-def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(
-    covariate, shape, kind, door, tmp_path, monkeypatch
-):
+def test_the_file_gives_the_film_of_the_law(covariate, shape, kind, door, tmp_path, monkeypatch):
     """Laws over the ray as functions, each form; the first of some through a kernel as well."""
     if LEARNED[covariate].flux_factor is None:
         # Every form is written over the ray; what differs over other covariates is their value.
