@@ -106,12 +106,16 @@ def test_pose_lag_is_a_trigger_recorded_later(lag_s, flow):
     np.testing.assert_allclose(film, expected, atol=2e-3 * expected.max())
 
 
-def test_gun_wake_is_the_whole_pass_moved_back():
+def test_gun_wake_is_the_pass_moved_back_and_a_wrong_tcp_another_distance():
     trajectory = serpentine((0.0,), speed_m_per_s=0.35)
     moved = replace(trajectory, positions_m=trajectory.positions_m - [0.02 * 0.35, 0.0, 0.0])
     film = painted(panel(), trajectory, EFFECTS['gun_wake'](lag_s=0.02)).raw_um
     expected = painted(panel(), moved).raw_um
     np.testing.assert_allclose(film, expected, atol=1e-9 * expected.max())
+    wrong = EFFECTS['tcp_standoff'](offset_z_m=0.02)
+    film = painted(panel(), spot(standoff_m=0.25), wrong).raw_um
+    nearer = painted(panel(), spot(standoff_m=0.23)).raw_um
+    np.testing.assert_allclose(film, nearer, atol=1e-12 * nearer.max())
 
 
 def test_flow_drifts_from_pass_to_pass():
@@ -233,10 +237,8 @@ def test_an_offset_turns_with_the_gun(roll_rad):
 @pytest.mark.parametrize(('axis', 'place'), [('y', 0), ('x', 2)])
 def test_a_tilt_moves_the_spot_by_the_standoff_times_its_tangent(standoff_m, axis, place):
     # The axis pierces the panel there; the centroid of an inclined spot lies beside its axis.
-    planar = MODEL.planar.model_copy(
-        update={'K3': 0.0, 'r_m': 0.0, 'sigma1_m': 0.01, 'sigma2_m': 0.01}
-    )
-    narrow, fine = MODEL.model_copy(update={'planar': planar}), panel(0.1, 0.004)
+    spot_m = {'K3': 0.0, 'r_m': 0.0, 'sigma1_m': 0.01, 'sigma2_m': 0.01}
+    narrow, fine = MODEL.with_patterns([MODEL.planar.model_copy(update=spot_m)]), panel(0.1, 0.004)
     tilt = EFFECTS['tcp_tilt'](**{f'tilt_{axis}_rad': 0.08})
     film_um = painted(fine, spot(standoff_m=standoff_m), tilt, model=narrow).raw_um
     moved_m = booth.centroid_m(film_um, fine.points())[place]
@@ -275,13 +277,6 @@ def test_width_and_volume_go_with_powers_of_the_distance(standoff_m):
     lossy = film_um(EFFECTS['standoff_efficiency'](exponent=0.7))
     expected = MODEL.planar.K1_cm3_per_s * ratio**-0.7
     assert booth.volume_cm3(lossy, POINTS) == pytest.approx(expected, rel=1e-4)
-
-
-def test_a_wrong_tcp_is_another_distance():
-    wrong = EFFECTS['tcp_standoff'](offset_z_m=0.02)
-    film = painted(panel(), spot(standoff_m=0.25), wrong).raw_um
-    nearer = painted(panel(), spot(standoff_m=0.23)).raw_um
-    np.testing.assert_allclose(film, nearer, atol=1e-12 * nearer.max())
 
 
 @pytest.mark.parametrize('attraction', [-1.0, 2.0])

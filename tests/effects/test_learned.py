@@ -221,10 +221,8 @@ def test_few_points_are_changed_as_they_are_among_many(kind, count):
 
 def test_each_part_follows_its_own_map():
     door_points = door().points()
-    both = LearnedMap(
-        maps=(grid_on(PANEL), grid_on(door_points, columns=2)),
-        learned=(*GRID.ravel().tolist(), 0.1, 0.2, 0.3, 0.4),
-    )
+    grids = grid_on(PANEL), grid_on(door_points, columns=2)
+    both = LearnedMap(maps=grids, learned=(*GRID.ravel().tolist(), 0.1, 0.2, 0.3, 0.4))
     film_um = np.full(len(PANEL), 20.0)
     assert np.array_equal(both.on_film(film_um, PANEL), on_part().on_film(film_um, PANEL))
     film_um = np.full(len(door_points), 20.0)

@@ -26,7 +26,7 @@ def table(file):
     return lambda *lines: file('door.csv', '\n'.join(lines) + '\n')
 
 
-def test_every_column_arrives_where_it_belongs(table):
+def test_every_column_arrives_and_without_labels_readings_at_one_place_are_repeats(table):
     path = table(
         f'point,{HEADER},operator,group,sigma_um,nx,ny,nz,session',
         'A1,0.1,0.2,0.3,21.5,Kim,left,0.8,0,-2,0,morning',
@@ -42,9 +42,6 @@ def test_every_column_arrives_where_it_belongs(table):
     assert np.isnan(readings.sigma_um[1])
     assert readings.normals.tolist() == [[0, -1, 0], [0, 0, 1]]
     assert readings.source == str(path)
-
-
-def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
     readings = read_readings(table(f'{HEADER},point', '0,0,0,20,', '0,0,0.01,21,', '1,0,0,9,A'))
     assert len(set(readings.point)) == 3
     readings = read_readings(table(HEADER, '0,0,0,20', '1,0,0,30', '0,0,0,21', '0,0,1e-4,22'))

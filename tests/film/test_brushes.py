@@ -64,13 +64,18 @@ def test_a_lag_takes_the_brush_along(lag_s):
     assert seconds_by_pattern(model, sprayed) == pytest.approx([0.5, 1.0], rel=1e-9)
 
 
-def test_terms_are_kept_apart_by_brush():
+def test_terms_are_kept_apart_by_brush_and_brushes_are_in_order_each_once():
     path, _ = spray_path(replace(weaving(TIMES_S), **CHANGES))
     film = FilmIntegrator(lying_plane(), MODEL, 'double', parallel=False)
     terms = film.terms(film.steps(path))
     weights = np.concatenate([term_weights(planar)[0] for planar in MODEL.patterns])
     film.add(path)
     assert np.abs(weights @ terms - film.film_um).max() < 1e-9 * film.film_um.max()
+    one, two = MODEL.brushes
+    assert DepositionModel(brushes=(two, one)) == MODEL
+    assert MODEL.planar == NARROW
+    with pytest.raises(ValueError, match='the same number'):
+        DepositionModel(brushes=(one, one))
 
 
 def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():
@@ -109,11 +114,3 @@ def test_states_that_a_model_refuses_are_left_out_as_by_a_live_film(model, other
     assert taken.warnings[0].startswith(f'run: {warning}')
     with pytest.raises(ModelError, match=r'^run: brush'):
         without_refused_states(motion, model, strict=True)
-
-
-def test_brushes_are_in_the_order_of_their_numbers_each_once():
-    one, two = MODEL.brushes
-    assert DepositionModel(brushes=(two, one)) == MODEL
-    assert MODEL.planar == NARROW
-    with pytest.raises(ValueError, match='the same number'):
-        DepositionModel(brushes=(one, one))

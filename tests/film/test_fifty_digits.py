@@ -22,10 +22,8 @@ def flux_um_per_s(model, position, normal, tcp, rotation):
     """Eq. (2) of one point for one pose, by the paper; all numbers of fifty digits."""
     plane, pattern = mpf(model.projection.model_plane_m), model.planar
     axes = [[mpf(value) for value in column] for column in rotation.T.tolist()]
-    emission = [
-        mpf(place) - mpf(model.projection.emission_offset_m) * axis
-        for place, axis in zip(tcp.tolist(), axes[2], strict=True)
-    ]
+    behind = mpf(model.projection.emission_offset_m)
+    emission = [mpf(at) - behind * axis for at, axis in zip(tcp.tolist(), axes[2], strict=True)]
     ray = [mpf(place) - start for place, start in zip(position.tolist(), emission, strict=True)]
     x, y, z = (mpmath.fdot(ray, axis) for axis in axes)
     length = mpmath.sqrt(mpmath.fdot(ray, ray))

@@ -6,23 +6,14 @@ import numpy as np
 import pytest
 
 import paint_deposition as pd
+import scenes
 from brushes import two_brushes
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.errors import ModelError
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.pose_stream import TriggerChange
-from scenes import (
-    START_NS,
-    changes_of,
-    events,
-    lying_plane,
-    painted,
-    poses,
-    stamps_ns,
-    straight_pass,
-    weaving,
-)
+from scenes import lying_plane, painted, poses, stamps_ns, straight_pass
 
 MODEL = pd.DepositionModel()
 # Its film at a place depends on what lies ahead in the stroke.
@@ -54,7 +45,7 @@ def test_a_state_that_comes_a_little_late_cuts_where_it_belongs(batch, delay_s):
     motion = straight_pass(TIMES_S, **TRIGGERS)
     # A batch of 25 poses is 0.1 s long and comes at its end.
     latency_s = 0.1 + (0.1 if batch == 25 else 0.0)
-    film = followed(events(motion, batch, delay_s), trigger_latency_s=latency_s)
+    film = followed(scenes.events(motion, batch, delay_s), trigger_latency_s=latency_s)
     assert np.array_equal(film.snapshot().film_um, painted(lying_plane(), motion).film_um)
     assert film.counts.late_triggers == 0
 
@@ -62,7 +53,7 @@ def test_a_state_that_comes_a_little_late_cuts_where_it_belongs(batch, delay_s):
 def test_a_reset_before_any_pose_forgets_no_state():
     """A run begins with the states in force, and no other is announced where none has a pose."""
     motion = straight_pass(TIMES_S, **TRIGGERS)
-    first, *rest = changes_of(motion)
+    first, *rest = scenes.changes_of(motion)
     # By a clock that is an hour behind for a moment.
     behind = TriggerChange(first.stamp_ns - 3_600_000_000_000, 0.0)
     found_um = []
@@ -82,7 +73,7 @@ def test_a_reset_before_any_pose_forgets_no_state():
 @pytest.mark.slow
 def test_a_state_that_comes_too_late_is_counted_and_counts_from_there_on():
     motion = straight_pass(TIMES_S, **TRIGGERS)
-    film = followed(events(motion, 1, delay_s=0.15))
+    film = followed(scenes.events(motion, 1, delay_s=0.15))
     assert film.counts.late_triggers >= 2
     # Each change acts 0.05 s late, at 0.3 m/s on a film of some ten um/s.
     difference = np.abs(film.snapshot().film_um - painted(lying_plane(), motion).film_um).max()
@@ -91,7 +82,7 @@ def test_a_state_that_comes_too_late_is_counted_and_counts_from_there_on():
 
 def test_the_first_state_takes_back_what_was_painted_before_it():
     motion = straight_pass(TIMES_S, **TRIGGERS)
-    first, *rest = changes_of(motion)
+    first, *rest = scenes.changes_of(motion)
     film = LiveFilm(lying_plane(), MODEL)
     film.add_poses(poses(motion, slice(0, 300)))
     assert film.flow is None
@@ -121,7 +112,7 @@ def test_states_after_a_clock_was_set_back_count_though_the_film_is_reset_before
     """All of them, also one that comes with poses that may yet be stragglers."""
     motion, back_s = straight_pass(TIMES_S), 3600.0
     again = replace(motion, stamps_ns=motion.stamps_ns - round(1e9 * back_s))
-    film = followed([TriggerChange(START_NS, 1.0), poses(motion, slice(0, 500))])
+    film = followed([TriggerChange(scenes.START_NS, 1.0), poses(motion, slice(0, 500))])
     states = [(0.0, 1.0), (0.8, 0.0), (1.2, 0.5)]
     first, second, third = (change(at_s - back_s, flow) for at_s, flow in states)
     film.replay([first, second, poses(again, slice(0, 20)), third])
@@ -149,7 +140,7 @@ def test_a_state_that_is_told_ahead_holds_though_the_film_is_reset_before_its_po
 
 def test_the_log_paints_the_motion_again_with_another_model():
     motion = straight_pass(TIMES_S, **TRIGGERS)
-    film = followed(events(motion, 10, delay_s=0.05))
+    film = followed(scenes.events(motion, 10, delay_s=0.05))
     again = LiveFilm(lying_plane(), LAGGING)
     again.replay(film.log.events())
     offline = painted(lying_plane(), motion, LAGGING)
@@ -173,19 +164,19 @@ def test_another_model_from_here_on_leaves_the_film_so_far():
 
 def test_memory_is_bounded_and_says_so():
     motion = straight_pass(TIMES_S)
-    film = followed(events(motion, 100), pose_memory=500)
+    film = followed(scenes.events(motion, 100), pose_memory=500)
     assert not film.log.complete
     assert list(film.log.events()) == []
     assert np.array_equal(film.snapshot().film_um, painted(lying_plane(), motion).film_um)
     # Too late to be taken back: the gun is off from the first state on, not before.
-    film.add_trigger(TriggerChange(START_NS + 10_000_000_000, 1.0))
+    film.add_trigger(TriggerChange(scenes.START_NS + 10_000_000_000, 1.0))
     assert film.snapshot().film_um.max() > 1.0
 
 
 def test_a_film_that_carries_a_motion_on_keeps_to_models_with_its_brush():
     """Another part, and a model without the brush that sprays: refused before the next pose."""
     model = two_brushes()
-    before = followed([TriggerChange(START_NS, 1.0, 2)], model)
+    before = followed([TriggerChange(scenes.START_NS, 1.0, 2)], model)
     other_part = LiveFilm(lying_plane(), model)
     other_part.reset_keeping_trigger_of(before)
     with pytest.raises(ModelError, match='brush 2 is not in the model'):
@@ -200,7 +191,11 @@ def test_a_film_that_goes_on_begins_with_what_it_says_though_the_clock_is_set_ba
     half = len(motion) // 2
     stamps = motion.stamps_ns - round(back_s * 1e9) * (np.arange(len(motion)) >= half)
     last = TriggerChange(int(motion.stamps_ns[half - 1]), 1.0)
-    states = [TriggerChange(START_NS, 0.0), TriggerChange(int(stamps[half // 2]), 0.5), last]
+    states = [
+        TriggerChange(scenes.START_NS, 0.0),
+        TriggerChange(int(stamps[half // 2]), 0.5),
+        last,
+    ]
     film = followed([*states, poses(motion, slice(0, half))])
     film.reset()
     assert film.carried_over == [last]
@@ -215,12 +210,12 @@ def test_a_film_that_goes_on_begins_with_what_it_says_though_the_clock_is_set_ba
 @pytest.mark.parametrize('back_s', [0.4, 2.0, 3600.0])
 def test_a_state_of_a_stream_that_is_about_to_begin_changes_nothing_before_it(back_s):
     motion = straight_pass(TIMES_S)
-    stamps = np.array([START_NS, motion.stamps_ns[-1] - round(back_s * 1e9)])
+    stamps = np.array([scenes.START_NS, motion.stamps_ns[-1] - round(back_s * 1e9)])
     told = replace(
         motion, trigger_stamps_ns=stamps, trigger_flow=np.array([1.0, 0.0]),
         trigger_rows=np.array([0, len(motion)]),
     )  # fmt: skip
-    on, off = changes_of(told)
+    on, off = scenes.changes_of(told)
     film = followed([on, poses(motion, slice(None))])
     before_um = film.snapshot().film_um
     film.add_trigger(off)
@@ -234,7 +229,7 @@ def test_a_state_of_a_stream_that_is_about_to_begin_changes_nothing_before_it(ba
 @pytest.mark.parametrize('switched', [True, False])
 def test_a_clock_that_is_set_back_within_a_part_gives_the_offline_film(batch, back_s, switched):
     """States of either stream count in their own, though their times lie in one another's."""
-    motion = weaving(TIMES_S)
+    motion = scenes.weaving(TIMES_S)
     half = len(motion) // 2
     stamps = motion.stamps_ns - round(back_s * 1e9) * (np.arange(len(motion)) >= half)
     # (pose before which it comes, flow): the third of them the first of the stream after.

@@ -65,16 +65,13 @@ def test_batches_do_not_matter_to_the_last_bit(sizes, whole_strokes):
     assert streamed_counts == counts
 
 
-def test_the_trigger_cuts_within_a_segment():
+def test_the_trigger_cuts_within_a_segment_and_a_gap_is_gun_off():
     path, _ = spray_path(to_and_fro())
     on_s = (1.9 - 0.5037) + 0.7 * (3.3 - 2.4)
     assert path.spraying_time_s == pytest.approx(on_s, rel=1e-12)
     sprayed = path.stamp_ns[path.flow > 0.0]
     assert sprayed[0] >= scenes.stamps_ns(0.5037)
     assert set(path.flow) == {0.0, 0.7, 1.0}
-
-
-def test_a_gap_is_gun_off():
     times = np.concatenate([np.arange(0.0, 1.0, 0.02), np.arange(1.3, 2.0, 0.02)])
     path, counts = spray_path(scenes.straight_pass(times))
     assert counts.gaps == 1

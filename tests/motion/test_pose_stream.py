@@ -65,10 +65,10 @@ def test_what_is_no_pose_is_dropped_and_quaternions_are_brought_to_unit_length()
     assert (screen.counts.not_finite, screen.counts.not_unit_quaternions) == (3, 2)
 
 
-@given(
-    steps=st.lists(st.sampled_from([20, 20, 20, 20, 0, -20, -50, 300, -5000]), max_size=80),
-    batches=st.integers(1, 20),
-)
+STEPS = st.sampled_from([20, 20, 20, 20, 0, -20, -50, 300, -5000])
+
+
+@given(steps=st.lists(STEPS, max_size=80), batches=st.integers(1, 20))
 def test_batches_do_not_matter(steps, batches):
     stamps = 10_000 + np.cumsum(np.array([0, *steps]))
     streams, counts = followed(stamps, batches)
@@ -110,7 +110,7 @@ def test_poses_of_any_batches_come_back_to_the_last_bit(sizes):
         assert np.array_equal(np.concatenate([vars(batch)[name] for batch in batches]), column)
 
 
-def test_who_has_followed_a_part_gets_the_rest():
+def test_who_has_followed_a_part_gets_the_rest_and_the_first_poses_are_found():
     events = [_poses(0, 5), TriggerChange(5, 1.0), _poses(5, 5000), TriggerChange(9000, 0.0)]
     log, follower = _log(*events), MotionLog()
     for event in log.events():
@@ -120,9 +120,6 @@ def test_who_has_followed_a_part_gets_the_rest():
     assert not list(log.events(follower.poses, follower.changes))
     log.add(_poses(10_000, 3))
     assert _in_words(log.events(follower.poses, follower.changes)) == [10_000, 10_001, 10_002]
-
-
-def test_the_first_poses_are_found_between_changes():
     log = MotionLog()
     for first in range(0, 20, 5):
         log.add(_poses(first, 5))

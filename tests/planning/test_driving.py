@@ -174,17 +174,14 @@ def test_a_configuration_once_chosen_is_kept(planned, cell):
         cell.drive(planned.trajectory, False, other)
 
 
-@pytest.mark.parametrize(
-    ('place_m', 'words'),
-    [((5.0, 0.0), 'does not reach the first pose'), ((1.2, 0.2), 'follows the motion to')],
-)
-def test_what_cannot_be_driven_says_where(planned, cell, place_m, words):
-    part = Rigid.of([*place_m, *PART_POSE[2:]])
-    with pytest.raises(PlanError, match=words):
-        replace(cell, part=part).drive(planned.trajectory, free_roll=False)
-
-
-def test_a_robot_without_speeds_is_refused(tmp_path):
+def test_what_cannot_be_driven_says_where_and_a_robot_without_speeds_is_refused(
+    planned, cell, tmp_path
+):
+    for x_m, y_m, words in ((5.0, 0.0, 'does not reach the first pose'),
+                            (1.2, 0.2, 'follows the motion to')):  # fmt: skip
+        part = Rigid.of([x_m, y_m, *PART_POSE[2:]])
+        with pytest.raises(PlanError, match=words):
+            replace(cell, part=part).drive(planned.trajectory, free_roll=False)
     unknown = tmp_path / 'unknown.urdf'
     unknown.write_text(robot_arm.URDF.read_text().replace(' velocity="1"', '', 1))
     with pytest.raises(PlanError, match='no greatest speed of shoulder_pan'):

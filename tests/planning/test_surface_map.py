@@ -186,9 +186,8 @@ def test_a_screen_before_the_gun_is_met_while_it_passes_and_told_from_one_in_it(
     assert contact.end_s == pytest.approx((HALF + 0.05 + 0.04) / SPEED, abs=0.05)
     assert abs(contact.place_m[1] + 0.1) < 1e-9
     through = replace(MOTION, positions_m=MOTION.positions_m + np.array([0.0, 0.2, 0.0]))
-    (contact,) = contacts(
-        panel_with_screen(), through, pd.GunEnvelope(radius_m=0.04, before_m=0.0)
-    )
+    thin = pd.GunEnvelope(radius_m=0.04, before_m=0.0)
+    (contact,) = contacts(panel_with_screen(), through, thin)
     assert contact.by_gun
     assert 'touches' in str(contact)
 

@@ -114,10 +114,8 @@ def test_the_bands_take_the_share_of_the_picture_that_the_figures_tell():
     pixels, box = pixels_of(figure), figure.axes[0].get_window_extent()
     rows = slice(len(pixels) - int(box.y1), len(pixels) - int(box.y0))
     area = pixels[rows, int(box.x0) : int(box.x1)]
-    counts = [
-        np.sum(np.abs(area - np.round(255 * np.array(to_rgb(colour)))).sum(axis=2) < 4)
-        for colour in (BELOW, WITHIN, HIGH)
-    ]
+    bands = (np.round(255 * np.array(to_rgb(colour))) for colour in (BELOW, WITHIN, HIGH))
+    counts = [np.sum(np.abs(area - band).sum(axis=2) < 4) for band in bands]
     # From 10 to 30 um across the panel: 15 and 21 um lie a quarter and eleven twentieths along.
     assert np.array(counts) / sum(counts) == pytest.approx([0.25, 0.3, 0.45], abs=0.005)
     legends = filter(None, (axes.get_legend() for axes in figure.axes))

@@ -44,14 +44,11 @@ def test_units_are_not_said_twice_and_numbers_have_no_computers_exponent():
     assert found == ['0', '1234', '−0.000123', '2.5 × 10⁻⁹', '4 × 10⁸']
 
 
-def test_an_effect_without_a_docstring_is_told_by_its_signature_or_its_parameter():
+def test_effects_without_a_docstring_and_learned_laws_are_told_by_what_they_have():
     assert words.effect_meaning(HoleBuild) == 'Share of paint more at holes.'
     signed = type('Signed', (HoleBuild,), {'signature': 'more paint around holes'})
     assert words.effect_meaning(signed) == 'More paint around holes.'
     assert words.effect_meaning(FlowDrift) == FlowDrift.__doc__.splitlines()[0]
-
-
-def test_learned_laws_are_told_by_what_they_depend_on():
     name = 'learned law over the time since the motion began'
     assert words.effect_name('learned:time_s') == name
     assert words.effect_name('edge_build and learned:time_s') == f'edge build and {name}'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import qmc
@@ -41,13 +42,12 @@ class GaugeNoise:
         return np.round(np.maximum(reading, 0.0), 2)
 
 
-@dataclass(frozen=True)
-class Session:
-    """One visit with the gauge to a part: what was written down, and why it is not the film."""
+class Session(NamedTuple):
+    """What was written down at a part, its film over that of its kind, and the gauge's zero."""
 
-    thickness_um: np.ndarray  # (n,) as written down
-    level: float  # the part's film over that of its kind
-    offset_um: float  # of the gauge's zero
+    thickness_um: np.ndarray
+    level: float
+    offset_um: float
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,7 @@ def mistyped(reading_um: float, rng: np.random.Generator) -> float:
     return float(''.join(digits))
 
 
-def scatter(
-    part: Part, count: int, rng: np.random.Generator, keep_off_m: float
-) -> tuple[np.ndarray, np.ndarray]:
+def scatter(part: Part, count: int, rng, keep_off_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Quasi-random points on the surface, away from free edges."""
     cube = qmc.Sobol(2, scramble=True, seed=int(rng.integers(2**31))).random(1024)
     x, z = (cube[:, 0] - 0.5) * part.width_m, cube[:, 1] * part.height_m

@@ -144,12 +144,15 @@ def drive(part: Part, plan: Plan, rng: np.random.Generator) -> Motion:
     return _in_time(*together, plan)
 
 
+def across(plan: Plan) -> np.ndarray:
+    return np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])
+
+
 def hold(part: Part, plan: Plan, place_m: np.ndarray, standoff_m: float, open_s: float) -> Motion:
     """The gun stands square before a place of the part, and is open for so long."""
     x, _, z = place_m
     normal = part.normal(np.array(x), np.array(z))
-    across = np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])
-    turn = orthonormal(np.stack([across, -normal, -normal], axis=-1))
+    turn = orthonormal(np.stack([across(plan), -normal, -normal], axis=-1))
     time = np.arange(0.0, open_s + 2.0 * CLOSED_S, STEP_S)
     tcp = part.point(np.array(x), np.array(z)) + standoff_m * normal
     return Motion(
@@ -232,8 +235,7 @@ def _in_time(
         reversal = np.min(np.abs(path[:, None] - corners[None, :]), axis=1)
     speed = plan.speed_m_per_s * (1.0 - 0.5 * np.exp(-((reversal / 0.03) ** 2)))
     time = np.concatenate([[0.0], np.cumsum(np.diff(path) / (0.5 * (speed[1:] + speed[:-1])))])
-    across = np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])
-    turn = orthonormal(np.stack([np.broadcast_to(across, axis.shape), axis, axis], axis=-1))
+    turn = orthonormal(np.stack([np.broadcast_to(across(plan), axis.shape), axis, axis], axis=-1))
     opens = np.arange(trigger.size) % 2 == 0
     return Motion(time, tcp, turn, number, reversal, time[trigger], opens)
 

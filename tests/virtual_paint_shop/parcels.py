@@ -112,9 +112,7 @@ def half_width_m(parcels: Parcels) -> float:
     return float(edges[above[-1] + 1] - edges[above[0]])
 
 
-def draw_pattern(
-    rng: np.random.Generator, half_width: float, flow_cm3_per_s: float, emission_offset_m: float
-) -> Pattern:
+def draw_pattern(rng, half_width: float, flow_cm3_per_s: float, emission_offset_m) -> Pattern:
     """A believable bell pattern with the given SB50 (metres)."""
     ranges = ((0.05, 0.35), (0.0, 0.3), (-np.pi, np.pi), (0.28, 0.40), (0.13, 0.20), (0.20, 0.30))
     shape = (rng.uniform(*limits) for limits in ranges)

@@ -115,9 +115,8 @@ class Bench:
         self.plume = conner_plume(pattern, POOL, seed=seed)
         self._clean_landings = {}
         numbers = sorted(set(job.plan.brushes))
-        self._brushes = [
-            Bench(seed + n, job.of_brush(n), brushes[n], parcels // len(numbers)) for n in numbers
-        ]
+        each = parcels // max(len(numbers), 1)
+        self._brushes = [Bench(seed + n, job.of_brush(n), brushes[n], each) for n in numbers]
 
     def readings(self, truths: list[Truth], x, z) -> tuple[np.ndarray, np.ndarray]:
         """(film, what a noise-free gauge says) at the points, um."""

@@ -61,9 +61,8 @@ class Truth:
     @classmethod
     def of_size(cls, size: float, rng: np.random.Generator) -> float:
         """The amplitude of so many typical sizes, at the most `most`, with a physical sign."""
-        amount = min(cls.typical * size, cls.most)
-        flip = rng.choice([-1.0, 1.0])
-        return {'positive': amount, 'negative': -amount, 'either': flip * amount}[cls.sign]
+        signs = {'positive': 1.0, 'negative': -1.0, 'either': rng.choice([-1.0, 1.0])}
+        return signs[cls.sign] * min(cls.typical * size, cls.most)
 
     @classmethod
     def name(cls) -> str:
@@ -109,10 +108,8 @@ class Truth:
 
 def changes_flight(truth: Truth) -> bool:
     """Whether the parcels land elsewhere or in other numbers than in the clean job."""
-    return any(
-        getattr(type(truth), name) is not getattr(Truth, name)
-        for name in ('on_plume', 'on_motion', 'on_flow', 'on_air')
-    )
+    places = ('on_plume', 'on_motion', 'on_flow', 'on_air')
+    return any(getattr(type(truth), place) is not getattr(Truth, place) for place in places)
 
 
 def variant(base: type[Truth], form: str, why: str, **members: object) -> type[Truth]:

@@ -7,12 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import PlanError, RecordingError
-from paint_deposition.files.rapid.program import (
-    RapidProgram,
-    module_text,
-    program_trajectory,
-    read_program,
-)
+from paint_deposition.files.rapid import program as rapid
+from paint_deposition.files.rapid.program import module_text, read_program
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import GunSwitch, Move
 
@@ -27,7 +23,7 @@ def target(x, y=0.0, z=0.0, wxyz='1,0,0,0') -> str:
 def read(tmp_path):
     """`read(body, data='', **options)`: the program of a module with this `main` and data."""
 
-    def read(body: str, data: str = '', procedures: str = '', **options) -> RapidProgram:
+    def read(body: str, data: str = '', procedures: str = '', **options) -> rapid.RapidProgram:
         path = tmp_path / 'test.mod'
         path.write_text(
             f'MODULE Test\n{data}\nPROC main()\n{body}\nENDPROC\n{procedures}\nENDMODULE\n'
@@ -239,18 +235,13 @@ def test_an_option_of_a_procedure_is_handed_on_and_a_misspelt_one_refused(read):
     assert "pass has no option \\sped; did you mean 'speed'?" in says
 
 
-@pytest.mark.parametrize(
-    ('how', 'refused'),
-    [
-        ('tBell\\WObj:=wElse', 'it sprays in frames whose relation is not known'),
-        ('tOther', 'it sprays with'),
-    ],
-)
-def test_paint_in_two_frames_or_with_two_tools_is_refused(read, how, refused):
-    way = f'MoveL {target(1)},v100,fine,{how};'
-    body = f'{{}}\n{way}\nSet doGun;\nMoveL {target(2)},v100,fine,tBell;'
-    assert any('are left out' in note for note in read(body.format('')).notes)
-    assert refused in refusal(read, body.format('Set doGun;'))
+def test_paint_in_two_frames_or_with_two_tools_is_refused(read):
+    for how, refused in (('tBell\\WObj:=wElse', 'it sprays in frames whose relation is not known'),
+                         ('tOther', 'it sprays with')):  # fmt: skip
+        way = f'MoveL {target(1)},v100,fine,{how};'
+        body = f'{{}}\n{way}\nSet doGun;\nMoveL {target(2)},v100,fine,tBell;'
+        assert any('are left out' in note for note in read(body.format('')).notes)
+        assert refused in refusal(read, body.format('Set doGun;'))
 
 
 @pytest.mark.parametrize('paint_moves', [False, True])
@@ -266,12 +257,9 @@ def test_what_is_written_is_read_back(tmp_path, paint_moves):
     assert path.read_text().endswith(f'    {end};\n  ENDPROC\nENDMODULE\n')
     assert ('PaintL' in path.read_text()) == paint_moves
     read = read_program(path)
-    planned, again = (
-        [(m.spraying, m.spraying * m.brush, m.spraying * m.flow) for m in each]
-        for each in (moves, read.moves)
-    )
-    assert again == planned
     for planned, again in zip(moves, read.moves, strict=True):
+        guns = [(m.spraying, m.spraying * m.brush, m.spraying * m.flow) for m in (planned, again)]
+        assert guns[0] == guns[1]
         np.testing.assert_allclose(again.position_m, planned.position_m, rtol=0, atol=0.6e-6)
         turns = Rotation.from_quat([again.quaternion_xyzw, planned.quaternion_xyzw])
         assert (turns[0].inv() * turns[1]).magnitude() < 1e-6
@@ -291,12 +279,12 @@ def down(x, y=0.0, wxyz='0,1,0,0') -> str:
 @pytest.fixture
 def motion(read):
     """`motion(body)`: the trajectory of a module with this `main`."""
-    return lambda body: program_trajectory(read(body))
+    return lambda body: rapid.program_trajectory(read(body))
 
 
 def test_a_program_without_a_gun_sprays_all_the_way_and_says_so(motion, shared_data):
     program = read_program(shared_data / 'rapid/ECL_Grey_T_ROB1.mod')
-    trajectory = program_trajectory(program)
+    trajectory = rapid.program_trajectory(program)
     legs = np.diff([move.position_m for move in program.moves], axis=0)
     expected_s = np.linalg.norm(legs, axis=1).sum() / 0.1
     path, counts = spray_path(trajectory)

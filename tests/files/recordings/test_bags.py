@@ -65,10 +65,8 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     entries += [('/gun', START_NS + at, messages.trigger(at == 700)) for at in (700, 900)]
     # Logged late: only its own stamp says when the flow changed.
     states = [(70, True, 0.8, 60.0), (90, False, 0.8), (95, True, np.nan, 64.0)]
-    entries += [
-        ('/state', START_NS + 5_000 + k, messages.state(START_NS + at, *state))
-        for k, (at, *state) in enumerate(states)
-    ]
+    for k, (at, *state) in enumerate(states):
+        entries.append(('/state', START_NS + 5_000 + k, messages.state(START_NS + at, *state)))
     folder = write_bag(tmp_path / 'two_triggers', sorted(entries, key=lambda entry: entry[1]))
     gun = pd.read_recording(folder, None, 'gun')
     assert gun.trigger_stamps_ns.tolist() == [START_NS + 700, START_NS + 900]

@@ -39,7 +39,7 @@ def run(tmp_path):
     return writer.folder
 
 
-def test_metadata_file(run):
+def test_metadata_and_records_of_a_run(run):
     content = yaml.safe_load((run / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
     times = {
         'starting_time': {'nanoseconds_since_epoch': 2_000}, 'duration': {'nanoseconds': 3_000},
@@ -60,9 +60,6 @@ def test_metadata_file(run):
     assert (profile['durability'], profile['reliability']) == ('transient_local', 'reliable')
     assert profile['lifespan'] == {'sec': 9223372036, 'nsec': 854775807}
     assert sorted(path.name for path in run.iterdir()) == ['metadata.yaml', 'run_0.mcap']
-
-
-def test_records_in_the_file(run):
     with (run / 'run_0.mcap').open('rb') as stream:
         found = list(StreamReader(stream, validate_crcs=True).records)
     assert [r.profile for r in found if isinstance(r, Header)] == ['ros2']

@@ -90,6 +90,12 @@ def test_residuals_spread_evenly_within_the_radius_on_their_side_the_nearer_the_
     values = interpolation_matrix(plate, positions, plate.normals[near], 0.2) @ [-3.0, 5.0]
     weight = (1.0 - (np.linalg.norm(positions[0] - positions[1]) / 0.2) ** 2) ** 3
     assert values[near[0]] == pytest.approx((-3.0 + 5.0 * weight) / (1.0 + weight), abs=1e-12)
+    # The radius is from the spacing unless it is given.
+    points = np.array([[0.3, 0, 0.5], [0.34, 0, 0.5], [0.38, 0, 0.5]])
+    normals = np.tile([0.0, -1.0, 0.0], (3, 1))
+    assert areas.radius_of_readings_m(points) == pytest.approx(0.072)
+    given = interpolation_matrix(plate, points, normals, areas.radius_of_readings_m(points))
+    assert (interpolation_matrix(plate, points, normals) != given).nnz == 0
 
 
 @pytest.mark.parametrize(('angle_deg', 'same_side'), [(59.0, True), (61.0, False)])
@@ -101,14 +107,6 @@ def test_surface_turned_by_more_than_60_deg_is_another_side(plate, angle_deg, sa
     front = plate.normals[:, 1] < 0
     assert np.isfinite(field[front]).any() == same_side
     assert np.isnan(field[~front]).all()
-
-
-def test_the_radius_is_from_the_spacing_unless_given(plate):
-    points = np.array([[0.3, 0, 0.5], [0.34, 0, 0.5], [0.38, 0, 0.5]])
-    normals = np.tile([0.0, -1.0, 0.0], (3, 1))
-    assert areas.radius_of_readings_m(points) == pytest.approx(0.072)
-    given = interpolation_matrix(plate, points, normals, areas.radius_of_readings_m(points))
-    assert (interpolation_matrix(plate, points, normals) != given).nnz == 0
 
 
 BASE = pd.DepositionModel()

@@ -27,7 +27,7 @@ def on_panel(*names: str) -> UnmeasuredPart:
     return UnmeasuredPart(panel(), path, MODEL, {name: EFFECTS[name] for name in names})
 
 
-def test_noncentrality_is_what_the_model_cannot_imitate():
+def test_noncentrality_is_what_no_model_can_imitate_and_power_that_of_the_ratio():
     """Against the covariance of noise and model parameters, built in full."""
     random, rows = np.random.default_rng(4), np.arange(0, 40, 3)
     free, columns = 3.0 * random.normal(size=(40, 3)), random.normal(size=(40, 5))
@@ -36,10 +36,7 @@ def test_noncentrality_is_what_the_model_cannot_imitate():
     covariance = np.eye(len(rows)) + free @ free.T
     exact = np.diag(columns.T @ np.linalg.solve(covariance, columns))
     np.testing.assert_allclose(design.beyond_model(rows)[2], exact, rtol=1e-9)
-
-
-def test_power_is_that_of_the_likelihood_ratio():
-    """Both tails of a normal score are one tail of the noncentral chi-square."""
+    # Both tails of a normal score are one tail of the noncentral chi-square.
     strength = np.array([0.0, 2.0, 8.0])
     limit = chi2.isf(0.05 / 6, 1)
     squares = np.maximum(np.multiply.outer(strength, SIZES**2), 1e-12)
@@ -156,14 +153,11 @@ def test_effects_of_motion_do_not_show(sample_panel, name):
     assert film_um(sample_panel, one, model) == pytest.approx(film_um(sample_panel, one), abs=1e-9)
 
 
-def test_effects_of_a_whole_job_do_not_suit_a_spot():
+def test_effects_of_a_whole_job_do_not_suit_a_spot_and_a_film_that_may_sag_is_told():
     assert suits(BELL, {'lateral shift', 'curvature'})
     assert not suits(BELL, {'lateral shift', 'order'})
     fog = BELL.model_copy(update={'effects': (EFFECTS['overspray_fog'].typical(),)})
     assert not suits(fog, {'lateral shift'})
-
-
-def test_a_film_that_may_sag_is_told():
     thick = Spray('the same passes at twice the flow', ('a', 'b'), 4.0, 1.0, peak_um=60.0,
                   peak_now_um=30.0)  # fmt: skip
     assert thick.film_words == 'the film will reach 60 µm, now 30: see that it does not sag'

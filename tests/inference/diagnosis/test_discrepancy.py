@@ -11,12 +11,8 @@ from inference.diagnosis.readings_on_door import at_model, on_door, on_panel, st
 from paint_deposition.effects.learned.law import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.design.sprays import MENU
-from paint_deposition.inference.diagnosis.discrepancy import (
-    FINE_RADII,
-    PRIOR,
-    ModelDiscrepancy,
-    painted_alike,
-)
+from paint_deposition.inference.diagnosis import discrepancy as of_nature
+from paint_deposition.inference.diagnosis.discrepancy import FINE_RADII, PRIOR, ModelDiscrepancy
 from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
 from paint_deposition.inference.fitting.study import Study
 
@@ -213,7 +209,9 @@ def test_which_parts_were_painted_alike():
     )
     off = replace(part, switched_off=frozenset(['voltage']))
     menu = {change.key: change.made(part) for change in MENU}
-    found = painted_alike([part, near, far, on_door(count=16), off, replace(part, name='again')])
+    found = of_nature.painted_alike(
+        [part, near, far, on_door(count=16), off, replace(part, name='again')]
+    )
     assert found.tolist() == [0, 0, 1, 2, 3, 0]
     for key in ('half_flow', 'double_speed', 'further', 'turned', 'longer_open', 'voltage_off'):
-        assert painted_alike([part, menu[key]]).tolist() == [0, 1], key
+        assert of_nature.painted_alike([part, menu[key]]).tolist() == [0, 1], key

@@ -42,17 +42,14 @@ def nulls(change: np.ndarray, **others: np.ndarray) -> learning.NullModels:
     return learning.NullModels(**{kind: beside.get(kind, null) for kind in kinds})
 
 
-def test_a_law_is_learned_once_where_there_is_one():
+def test_a_law_is_learned_once_where_it_says_more_than_what_may_vary_already():
     assert learning.choose_laws(nulls(0.0 * WAVE), [WAVY], np.inf) == []
     among = [replace(WAVY, columns=0.0 * CHANGE), WAVY, WAVY]
     ((number, size),) = learning.choose_laws(nulls(WAVE), among, np.inf)
     assert number in (1, 2)
     assert size > 1.0
     assert learning.choose_laws(nulls(WAVE), [replace(WAVY, random=None)], np.inf) == []
-
-
-def test_a_law_must_say_more_than_what_may_vary_already():
-    """Than any footprint could; but a correction of a law need not say more than its errors."""
+    # A correction of a law need not say more than the errors of that law.
     hidden = nulls(WAVE, nonparametric_laws=3.0 * CHANGE)
     assert learning.choose_laws(hidden, [WAVY], np.inf) == []
     assert len(learning.choose_laws(hidden, [replace(WAVY, corrects='edge_build')], np.inf)) == 1

@@ -28,6 +28,7 @@ SMALL, USUAL, LARGE, BEYOND = (
 # A change that neighbours share, and one that they do not.
 WAVE = np.sin(2.0 * PLACE)
 JAGGED = 0.7 * np.random.default_rng(2).normal(size=READINGS)
+LENGTHS_M = (0.05, 0.1, 0.3)
 # Sizes of the footprint, over the largest.
 SHARES = (0.1, 0.3, 1.0)
 
@@ -57,10 +58,7 @@ def found() -> list[Explanation]:
 
     return [
         law('air_drift', direction(0.8), direction(0.8), side=0),
-        *(
-            law('corner_slowdown', direction(0.9), share=1 / 3, length_m=m)
-            for m in (0.05, 0.1, 0.3)
-        ),
+        *(law('corner_slowdown', direction(0.9), share=1 / 3, length_m=x) for x in LENGTHS_M),
         law('edge_build', direction(0.7)),
         law('faraday_shielding', direction(1.2)),
         *(unknown(0.3 * random.normal(size=(READINGS, 6)), 0.5) for _ in range(2)),
@@ -88,11 +86,9 @@ def probability(space: ModelSpace, cause: str) -> float:
 def drawn_spaces(plain, found, discrepancy, of, known, freedom=np.inf) -> list[ModelSpace]:
     """Of readings that a discrepancy of one size made, at the sizes that are known."""
     null = plain.with_discrepancy(discrepancy.covariance(of))
-    draws = simulated(READINGS, freedom, NULL_RUNS, seed=11)
-    return [
-        space_of(NullModel.of(plain.columns, raw), found, discrepancy, *known, freedom=freedom)
-        for raw in (null.lower @ draws).T
-    ]
+    draws = null.lower @ simulated(READINGS, freedom, NULL_RUNS, seed=11)
+    nulls = (NullModel.of(plain.columns, raw) for raw in draws.T)
+    return [space_of(one, found, discrepancy, *known, freedom=freedom) for one in nulls]
 
 
 @pytest.fixture

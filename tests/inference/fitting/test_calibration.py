@@ -171,10 +171,8 @@ def test_paint_beyond_the_readings_is_that_of_the_normal_distribution():
     """A pattern of one Gaussian leaves a Gaussian across the pass."""
     sigma_m = 0.2
     gaussian = pd.DepositionModel(planar=PlanarPattern(K2=1.0, K3=0.0, sigma2_m=sigma_m))
-    narrow, wide = (
-        painted_by(gaussian, passes((1.0,)), column(*ends), name=f'{ends}')
-        for ends in ((0.8, 1.3), (0.6, 1.4))
-    )
+    one_pass, ends = passes((1.0,)), ((0.8, 1.3), (0.6, 1.4))
+    narrow, wide = (painted_by(gaussian, one_pass, column(*e), name=f'{e}') for e in ends)
     (reach,) = short_reaches(pd.Campaign((narrow,)), gaussian)
     assert sorted(reach.ends_m) == pytest.approx([0.2, 0.3], abs=1e-6)
     expected = norm.sf(np.array(reach.ends_m) / sigma_m)

@@ -62,10 +62,7 @@ def test_facets_of_a_coarse_mesh_are_noise_which_points_keep_and_a_fine_one_has_
     fine = study(FINE_M)
     assert fine.facet_um is None
     assert not any('coarser' in note for note in fine.notes)
-
-
-def test_the_noise_is_what_the_facets_cost(coarse):
-    """The model is the true one: what is left of the readings is noise and facets."""
+    # The model is the true one: what is left of the readings is noise and facets.
     left_um = coarse.measured_um - coarse.forward.predict_um(MODEL)
     amount = left_um @ coarse.facet_um / (coarse.facet_um @ coarse.facet_um)
     assert 0.5 < amount < 1.5

@@ -19,11 +19,10 @@ from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import spray_path
 
 BASE = pd.DepositionModel()
-TRUTH = pd.DepositionModel(
-    planar=PlanarPattern(
-        K1_cm3_per_s=1.6, K2=0.3, K3=0.25, phi_rad=0.9, r_m=0.17, sigma1_m=0.07, sigma2_m=0.12
-    )
+PLANAR = PlanarPattern(
+    K1_cm3_per_s=1.6, K2=0.3, K3=0.25, phi_rad=0.9, r_m=0.17, sigma1_m=0.07, sigma2_m=0.12
 )
+TRUTH = pd.DepositionModel(planar=PLANAR)
 SIGMA_UM = 0.15
 
 

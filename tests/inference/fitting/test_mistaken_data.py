@@ -136,11 +136,11 @@ def test_a_comparison_warns_of_mirrored_and_names_swapped_readings_once(panels):
 
 
 def test_a_diagnosis_stops_at_exchanged_readings(panels):
-    first, second = (
-        part.with_readings(replace(part.readings, source=f'{part.name}.csv'))
-        for part in panels.experiments
+    parts = panels.experiments
+    named = (replace(part.readings, source=f'{part.name}.csv') for part in parts)
+    found = pd.diagnose(
+        exchanged(*(p.with_readings(r) for p, r in zip(parts, named, strict=True)))
     )
-    found = pd.diagnose(exchanged(first, second))
     assert found.verdict == 'fit_broken'
     assert 'the readings of panel 1 and panel 2 look exchanged: ' in found.reason
     assert 'pair them the other way round in the campaign' in found.reason

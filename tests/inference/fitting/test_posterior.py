@@ -23,14 +23,14 @@ WITH_EFFECT = FreeParameters.of(pd.DepositionModel(), CornerSlowdown(gain=0.5, l
 
 
 @pytest.fixture(scope='module')
-def panel() -> Experiment:
+def campaign() -> pd.Campaign:
     grid = np.array([[0.1 * k, 0.0, 1.0] for k in range(-3, 4)])
-    return painted_by(pd.DepositionModel(), passes([1.0]), grid)
+    return pd.Campaign((painted_by(pd.DepositionModel(), passes([1.0]), grid),))
 
 
-@pytest.fixture(scope='module')
-def campaign(panel) -> pd.Campaign:
-    return pd.Campaign((panel,))
+@pytest.fixture
+def panel(campaign) -> Experiment:
+    return campaign.experiments[0]
 
 
 def thicker(panel: Experiment, **settings) -> pd.Campaign:
@@ -48,9 +48,8 @@ def test_the_posterior_of_a_job_is_the_prior_of_the_next_widened(parameters, cam
     between = [c.between_jobs for c in PATTERN]
     between += [EFFECT_BETWEEN_JOBS] * (len(parameters) - len(PATTERN))
     assert prior.centre == pytest.approx(fit.vector)
-    assert prior.factor @ prior.factor.T == pytest.approx(
-        scaled_covariance(fit) + np.diag(np.square(between)), rel=1e-6, abs=1e-12
-    )
+    widened = scaled_covariance(fit) + np.diag(np.square(between))
+    assert prior.factor @ prior.factor.T == pytest.approx(widened, rel=1e-6, abs=1e-12)
 
 
 def test_effects_are_told_in_their_own_units(campaign):

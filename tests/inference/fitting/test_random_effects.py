@@ -7,6 +7,7 @@ import pytest
 
 import paint_deposition as pd
 from inference.diagnosis.linear import fit_linear
+from inference.diagnosis.readings_on_door import study_of
 from inference.fitting.panels import gauged, grid_m, painted_by, passes, reading
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.diagnosis.verdict import Step
@@ -25,10 +26,6 @@ def part(name: str, session: str | np.ndarray = '') -> Experiment:
     one = painted_by(pd.DepositionModel(), passes([1.0]), places, name=name)
     sessions = np.broadcast_to(session, len(one.readings))
     return one.with_readings(replace(one.readings, session=sessions))
-
-
-def study_of(*parts: Experiment) -> Study:
-    return Study.of(pd.Campaign(parts))
 
 
 def estimated(study: Study, change_um: np.ndarray) -> dict:

@@ -8,19 +8,12 @@ import pytest
 import paint_deposition as pd
 from booth import panel, path_of, serpentine
 from paint_deposition.errors import ReadingsError
+from paint_deposition.inference.readings import gauge_noise as repeats
+from paint_deposition.inference.readings import readings as taken
 from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.inference.readings.gauge_noise import (
-    ASSUMED_FREEDOM,
-    gauge_noise,
-    gross_outliers,
-    left_out_lines,
-)
+from paint_deposition.inference.readings.gauge_noise import gauge_noise, gross_outliers
 from paint_deposition.inference.readings.places import columns_or_rows, unit_in_doubt
-from paint_deposition.inference.readings.readings import (
-    PointMeans,
-    Residuals,
-    require_repeats_close,
-)
+from paint_deposition.inference.readings.readings import PointMeans, Residuals
 from paint_deposition.motion.path import SprayPath
 
 # Numbers of readings at each point.
@@ -34,9 +27,9 @@ def usual_noise_um(film_um: np.ndarray) -> np.ndarray:
 
 def campaigns(layout: str, random) -> Iterator[tuple[pd.Readings, np.ndarray]]:
     """Readings of 20 to 60 um with the usual noise, and the film below them."""
-    repeats = LAYOUTS[layout]
-    owner = np.repeat(np.arange(len(repeats)), repeats)
-    film = np.linspace(20.0, 60.0, len(repeats))[owner]
+    counts = LAYOUTS[layout]
+    owner = np.repeat(np.arange(len(counts)), counts)
+    film = np.linspace(20.0, 60.0, len(counts))[owner]
     for _ in range(CAMPAIGNS):
         thickness = film + usual_noise_um(film) * random.normal(size=len(owner))
         yield pd.Readings.of(np.zeros((len(owner), 3)), thickness, point=owner.astype(str)), film
@@ -110,8 +103,8 @@ def test_without_enough_repeats_only_what_no_gauge_reads_is_gross():
 
 
 def test_what_is_left_out_is_named():
-    taken = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
-    one, other = left_out_lines(taken, np.array([False, True, False, False, True]))
+    read = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
+    one, other = repeats.left_out_lines(read, np.array([False, True, False, False, True]))
     assert one.startswith("point 'a': 15.5, 26.25 µm contradict each other; left out of the fit")
     assert other.startswith("point 'b': 4 µm beside 20, 20.5; left out of the fit")
 
@@ -124,15 +117,15 @@ def test_repeats_are_averaged_in_order_and_one_label_at_two_places_is_refused():
     assert means.owner.tolist() == [0, 1, 2, 1, 0, 0]
     places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.02], [0.0, 0.0, 0.05]])
     labels = np.array(['A', 'A', 'A'])
-    require_repeats_close(pd.Readings.of(places[:2], [1.0, 2.0], point=labels[:2]))
+    taken.require_repeats_close(pd.Readings.of(places[:2], [1.0, 2.0], point=labels[:2]))
     with pytest.raises(ReadingsError, match=r"point 'A' is used 0\.050 m apart"):
-        require_repeats_close(pd.Readings.of(places, [1.0, 2.0, 3.0], point=labels))
+        taken.require_repeats_close(pd.Readings.of(places, [1.0, 2.0, 3.0], point=labels))
 
 
 def test_without_scatter_to_go_by_the_usual_noise_is_assumed():
     for labels, thickness in (('ab', [20.0, 30.0]), ('a' * 9, [20.0] * 9)):
         noise = gauge_noise(at_points(labels, thickness))
-        assert (noise.source, noise.degrees_of_freedom) == ('assumed', ASSUMED_FREEDOM)
+        assert (noise.source, noise.degrees_of_freedom) == ('assumed', repeats.ASSUMED_FREEDOM)
         assert noise.sigma_um == pytest.approx(usual_noise_um(np.array(thickness)))
 
 
