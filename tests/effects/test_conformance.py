@@ -42,7 +42,7 @@ AMPLITUDE = pytest.mark.parametrize(('effect', 'name'), [case(*one) for one in A
 
 
 @EFFECT
-def test_it_says_what_it_is(effect: type[Effect]):
+def test_it_says_what_it_is_and_every_parameter_its_unit_bounds_and_size(effect):
     assert effect.__doc__
     assert effect.family
     assert effect.signature
@@ -53,10 +53,6 @@ def test_it_says_what_it_is(effect: type[Effect]):
         assert set(effect.rivals) <= set(EFFECTS) - {effect.id}
         assert all(effect.id in EFFECTS[rival].rivals for rival in effect.rivals)
         assert problem_in_words(effect) is None
-
-
-@EFFECT
-def test_every_parameter_states_its_unit_bounds_and_size(effect: type[Effect]):
     for name, described in effect.parameters().items():
         assert name.endswith(UNIT_SUFFIXES[described['unit']]), name
         assert described['low'] <= described['neutral'] < described['high']

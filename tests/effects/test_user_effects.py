@@ -63,12 +63,18 @@ def test_a_law_may_use_all_of_the_ray_and_numbers_of_its_module(own):
         assert compiled == pytest.approx(law(Ray(*map(float, ray)), 0.5), rel=1e-6)
 
 
-def test_the_same_file_is_the_same_class_and_can_go_to_another_process(own):
+def test_the_same_file_is_the_same_class_and_one_of_a_script_has_none(own, tmp_path):
     path = own()
     effect = load_effect_file(path)
     assert load_effect_file(str(path)) is effect
     assert effect.file == path
     assert pickle.loads(pickle.dumps(effect.typical())) == effect.typical()
+    spec = importlib.util.spec_from_file_location('script', own())
+    script = sys.modules['script'] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    model = pd.DepositionModel(effects=(script.WakeLoss(loss_per_m_per_s=0.3),))
+    with pytest.raises(ModelError, match="effect 'wake_loss' has no file; put WakeLoss in a file"):
+        pd.write_model(tmp_path / 'out.yaml', model)
 
 
 def line(text: str) -> list[tuple[str, str]]:
@@ -171,15 +177,6 @@ def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
     columns = (field.name for of in (SprayPath, PathContext) for field in fields(of))
     for name in (*columns, 'downhill', 'across', 'slope_per_m', *NEEDS[1:]):
         assert f'`{name}`' in text or f"`'{name}'`" in text or f"'{name}'`" in text
-
-
-def test_a_class_of_a_script_has_no_file_that_a_model_could_name(own, tmp_path):
-    spec = importlib.util.spec_from_file_location('script', own())
-    script = sys.modules['script'] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
-    model = pd.DepositionModel(effects=(script.WakeLoss(loss_per_m_per_s=0.3),))
-    with pytest.raises(ModelError, match="effect 'wake_loss' has no file; put WakeLoss in a file"):
-        pd.write_model(tmp_path / 'out.yaml', model)
 
 
 IMPORTED = """

@@ -193,13 +193,26 @@ def test_gltf_is_in_metres_and_its_bodies_are_one_part(tmp_path, name):
     assert bodies.startswith(f'{name}: its 2 bodies were taken as one part: door, flange; --body')
 
 
-def test_one_body_is_taken_by_its_name(tmp_path):
+def test_one_body_is_taken_by_its_name_also_of_an_obj_and_a_text_stl(tmp_path):
     two_bodies().export(tmp_path / 'car.glb')
     surface = read_mesh(tmp_path / 'car.glb', max_edge_length_m=0.2, body='flange')
     assert box_m(surface) == [[-0.6, 0.05, -0.61], [0.6, 0.15, -0.59]]
     assert surface.notes[1] == "car.glb: of its 2 bodies 'flange' was taken"
     with pytest.raises(MeshError, match=r"car\.glb has no body 'flang'; did you mean 'flange'\?"):
         read_mesh(tmp_path / 'car.glb', body='flang')
+    (tmp_path / 'part.obj').write_text(
+        'o left\nv 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3 4\no right\nv 2 0 0\nv 2 0 1\n'
+        'f 2 5 6 3\n'
+    )
+    assert read_mesh(tmp_path / 'part.obj', body='right').vertices_m[:, 0].min() == 1.0
+    solids = [box((0.2, 0.2, 0.2)), box((0.2, 0.2, 0.2), translation_matrix([1.0, 0.0, 0.0]))]
+    text = [
+        solid.export(file_type='stl_ascii').replace('solid', f'solid {name}', 1)
+        for name, solid in zip(('near', 'far'), solids, strict=True)
+    ]
+    (tmp_path / 'part.stl').write_text('\n'.join(text))
+    assert read_mesh(tmp_path / 'part.stl', body='far').vertices_m[:, 0].min() > 0.8
+    assert read_mesh(tmp_path / 'part.stl').area_m2 == pytest.approx(0.48)
 
 
 @pytest.mark.parametrize(('unit', 'per_metre'), [('inch', 1 / 0.0254), ('meter', 1.0)])
@@ -214,22 +227,6 @@ def test_3mf_is_read_in_its_own_unit(tmp_path, unit, per_metre):
     assert surface.area_m2 == pytest.approx(area_m2(DOOR_M, FLANGE_M), rel=1e-5)
     assert unit.removesuffix('er') in surface.notes[0]
     assert '2 bodies' in surface.notes[1]
-
-
-def test_objects_of_an_obj_and_solids_of_a_text_stl_have_names(tmp_path):
-    (tmp_path / 'part.obj').write_text(
-        'o left\nv 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3 4\no right\nv 2 0 0\nv 2 0 1\n'
-        'f 2 5 6 3\n'
-    )
-    assert read_mesh(tmp_path / 'part.obj', body='right').vertices_m[:, 0].min() == 1.0
-    solids = [box((0.2, 0.2, 0.2)), box((0.2, 0.2, 0.2), translation_matrix([1.0, 0.0, 0.0]))]
-    text = [
-        solid.export(file_type='stl_ascii').replace('solid', f'solid {name}', 1)
-        for name, solid in zip(('near', 'far'), solids, strict=True)
-    ]
-    (tmp_path / 'part.stl').write_text('\n'.join(text))
-    assert read_mesh(tmp_path / 'part.stl', body='far').vertices_m[:, 0].min() > 0.8
-    assert read_mesh(tmp_path / 'part.stl').area_m2 == pytest.approx(0.48)
 
 
 @needs_step

@@ -18,7 +18,7 @@ from paint_deposition.part.zones import Box, PointZones, Zone, Zones
 from scenes import lying_plane, stamps_ns, straight_pass
 
 
-def test_area_weighs_not_the_number_of_vertices():
+def test_area_weighs_and_is_shared_by_below_within_and_above():
     film = np.array([10.0, 10.0, 10.0, 30.0])
     area = np.array([0.1, 0.1, 0.1, 0.3])
     stats = film_statistics(film, area, emitted_cm3=15.0)
@@ -28,6 +28,12 @@ def test_area_weighs_not_the_number_of_vertices():
     assert stats.capture_fraction == pytest.approx(0.8, rel=1e-12)
     assert stats.std_dev_um == pytest.approx(10.0, rel=1e-12)
     assert (stats.min_um, stats.max_um) == (10.0, 30.0)
+    film, area = np.array([0.0, 10.0, 20.0, 30.0]), np.array([5.0, 0.2, 0.5, 0.3])
+    stats = film_statistics(film, area, 1.0, target_um=20.0, target_tolerance_um=5.0)
+    shares = stats.below_target, stats.within_target, stats.above_target
+    assert shares == pytest.approx((0.2, 0.5, 0.3))
+    with pytest.raises(PaintError, match='tolerance_um 20 is not less than target_um 20: bare'):
+        film_statistics(np.ones(1), np.ones(1), 1.0, target_um=20.0, target_tolerance_um=20.0)
 
 
 def test_bare_metal_counts_for_coverage_and_volume_only_and_figures_say_what_is_not_known():
@@ -41,15 +47,6 @@ def test_bare_metal_counts_for_coverage_and_volume_only_and_figures_say_what_is_
     assert math.isnan(stats.capture_fraction)
     assert stats.to_dict()['capture_fraction'] is None
     assert (stats.mean_um, stats.std_dev_um, stats.max_um, stats.coverage) == (0, 0, 0, 0)
-
-
-def test_below_within_and_above_share_the_painted_area():
-    film, area = np.array([0.0, 10.0, 20.0, 30.0]), np.array([5.0, 0.2, 0.5, 0.3])
-    stats = film_statistics(film, area, 1.0, target_um=20.0, target_tolerance_um=5.0)
-    shares = stats.below_target, stats.within_target, stats.above_target
-    assert shares == pytest.approx((0.2, 0.5, 0.3))
-    with pytest.raises(PaintError, match='tolerance_um 20 is not less than target_um 20: bare'):
-        film_statistics(np.ones(1), np.ones(1), 1.0, target_um=20.0, target_tolerance_um=20.0)
 
 
 def test_cpk_is_the_way_to_the_nearer_limit_over_three_standard_deviations():

@@ -67,13 +67,16 @@ def test_the_tolerance_is_named_where_the_curve_is_away_from_it(range_m, side):
     assert label.get_ha() == side
 
 
-def test_drift_limits_are_where_the_tolerance_breaks():
+def test_drift_limits_are_where_the_tolerance_breaks_and_with_effects_not_known():
     answer = recommended(tolerance=0.05, index_min_m=0.4)
     assert answer.index_drift_m in answer.windows_m
     for change in answer.standoff_drift_m:
         there = sigma_n(SYMMETRIC, answer.index_m, standoff_m=0.25 + change)
         assert there == pytest.approx(0.05, abs=1e-5)
     assert answer.standoff_drift_m[0] < 0.0 < answer.standoff_drift_m[1]
+    answer = recommended(SYMMETRIC.with_effect(EFFECTS['overspray_fog']()), tolerance=0.05)
+    assert any('overspray_fog' in note for note in answer.notes)
+    assert answer.standoff_drift_m is None
 
 
 def test_passes_cover_the_width_to_its_edges():
@@ -136,10 +139,10 @@ def test_default_range_follows_the_width_of_the_pattern(scale):
     assert recommended().index_range_m == (0.2, 0.8)
 
 
-@pytest.mark.parametrize(
-    ('low', 'high', 'what'),
-    [(0.35, 0.45, {}), (0.45, 0.55, {}), (0.29, 0.5, {'tolerance': 0.06})],
-)
+ENDS = [(0.35, 0.45, {}), (0.45, 0.55, {}), (0.29, 0.5, {'tolerance': 0.06})]
+
+
+@pytest.mark.parametrize(('low', 'high', 'what'), ENDS)
 def test_without_a_minimum_the_more_even_end_is_recommended(low, high, what):
     answer = recommended(index_min_m=low, index_max_m=high, **what)
     ends = answer.windows_m[0] if 'tolerance' in what else answer.index_range_m
@@ -161,12 +164,6 @@ def test_the_speed_for_a_target_keeps_its_limits():
     assert held.mean_um == pytest.approx(20.0)
     assert any('other speeds than are allowed' in note for note in held.notes)
     assert not any('other speeds than are allowed' in note for note in free.notes)
-
-
-def test_what_is_not_known_with_effects_is_left_out_and_named():
-    answer = recommended(SYMMETRIC.with_effect(EFFECTS['overspray_fog']()), tolerance=0.05)
-    assert any('overspray_fog' in note for note in answer.notes)
-    assert answer.standoff_drift_m is None
 
 
 @pytest.mark.parametrize(

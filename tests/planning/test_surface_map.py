@@ -60,16 +60,13 @@ def test_hidden_and_averted_surface_is_not_painted():
     assert not surface_map.painted[y > 0.1].any()
 
 
-def test_ends_of_a_slanted_part_follow_the_pass():
+def test_ends_of_a_slanted_part_follow_the_pass_and_impossible_parts_are_refused():
     surface = sheet(lambda x, z: 0.0 * x)
     cut = surface.faces[surface.vertices_m[surface.faces].mean(axis=1) @ [1.0, 0.0, 1.0] < 0.0]
     part = pd.Surface.from_triangles(surface.vertices_m, cut, 0.05)
     surface_map = SurfaceMap(part, pass_axes(part), 0.05)
     low, high = (np.ptp(surface_map.extent_near_m(z, 0.01)) for z in (0.4, -0.3))
     assert low > high + 0.4
-
-
-def test_impossible_parts_are_refused():
     surface = sheet(lambda x, z: 0.0 * x)
     with pytest.raises(PlanError, match='no surface faces the gun'):
         SurfaceMap(surface, pass_axes(surface, outward=(0.0, 1.0, 0.0)), 0.1)

@@ -63,9 +63,8 @@ def test_a_learned_law_is_told_by_its_curve_and_its_range():
     assert words.learned_words(passes)[1] == ('over', '1 to 6', '')
     fog = LEARNED['height_fraction'](kind='addition', learned=(2.0, -0.5))
     assert words.learned_words(fog)[0] == ('addition', '−0.5 to 2', 'µm')
-    grid = PartGrid(
-        part_m=(1.2, 0.1, 0.5), low_m=(-0.5, -0.2), high_m=(0.5, 0.2), columns=2, rows=2
-    )
+    ends = {'low_m': (-0.5, -0.2), 'high_m': (0.5, 0.2)}
+    grid = PartGrid(part_m=(1.2, 0.1, 0.5), **ends, columns=2, rows=2)
     map_ = LEARNED['place'](maps=(grid,), learned=(0.1, 0.0, 0.0, -0.2))
     factor, over = words.learned_words(map_)
     assert factor == ('factor', '0.8 to 1.1', '')

@@ -208,7 +208,7 @@ START = f'MoveL {target(0)},v100,z10,tool0'
         (r'MoveAbsJ [[0,0,0,0,0,0],[0,0,0,0,0,0]],v100,fine,tBell;', 'has no moves of the TCP'),
         (f'MoveL {target(1)},v100,fine,tStill;', 'tstill stands still'),
         (rf'{START}\WObj:=wHeld;', 'holds the work object wheld'),
-        (START.replace('1,0,0,0', '1,0,0,0.2'), 'mod line 4: quaternion [1.0, 0.0, 0.0, 0.2] has'),
+        (f'{START};'.replace('1,0,0,0', '1,0,0,0.2'), 'line 4: quaternion [1.0, 0.0, 0.0, 0.2]'),
         (rf'{START}\WObj:=wBad;', 'is no position [x, y'),
         (f'MoveL {target("1e400")},v100,z10,tool0;', 'is no position [x, y'),
         ('none:=1/0;', 'line 4: division by zero'),

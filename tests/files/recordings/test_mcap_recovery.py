@@ -79,9 +79,11 @@ def test_a_cut_run_becomes_a_whole_one(tmp_path, cut_run, given):
     assert metadata['type_description_hash'] == standard(BOOL).type_hash
 
 
+NESTED = '{a: ' * 600 + '1' + '}' * 600
+
+
 @pytest.mark.parametrize(
-    'told',
-    ['a: 2024-13-45', '{a: ' * 600 + '1' + '}' * 600, 'custom_data: [1]', 'a: &a [*a]', '- 1'],
+    'told', ['a: 2024-13-45', NESTED, 'custom_data: [1]', 'a: &a [*a]', '- 1']
 )
 def test_odd_metadata_in_a_file_do_not_keep_it_from_being_recovered(tmp_path, told):
     with RunWriter(tmp_path / 'run') as run:

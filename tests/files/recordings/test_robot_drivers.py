@@ -107,9 +107,8 @@ def table(path, columns):
 
 EGM = joints('/egm/joint_states', ABB_JOINTS, SWEEP)
 PREFIXED = joints('/egm/joint_states', [f'irb_{name}' for name in ABB_JOINTS], SWEEP)
-DEGREES = joints(
-    '/arm_JointState', [name.replace('_', '') for name in ABB_JOINTS], np.degrees(SWEEP)
-)
+UNSCORED = [name.replace('_', '') for name in ABB_JOINTS]
+DEGREES = joints('/arm_JointState', UNSCORED, np.degrees(SWEEP))
 RAIL = joints('/rail/joint_states', ['rail'], RAIL_M[:, None], every=2)
 RAIL_MM = joints('/rail/joint_states', ['rail'], 1e3 * RAIL_M[:, None], every=2)
 MILLIMETRES = poses('/arm_PoseStamped', 'PoseStamped', 1e3, '')
@@ -121,9 +120,7 @@ DRIVERS = {
     'degrees': ((DEGREES,), {'urdf': 'arm', 'angle_unit': 'deg'}, 'give --angle-unit deg'),
     'rail': ((EGM, RAIL), {'urdf': 'railed'}, 'give urdf'),
     'rail in mm': ((EGM, RAIL_MM), {'urdf': 'railed', 'pose_unit': 'mm'}, ''),
-    'named topics': (
-        BOTH, {'urdf': 'arm', 'pose_topic': '/egm/joint_states'}, '--pose-topic /egm/joint_states',
-    ),
+    'named topics': (BOTH, {'urdf': 'arm', 'pose_topic': '/egm/joint_states'}, '--pose-topic'),
     'millimetres': ((MILLIMETRES,), {'pose_unit': 'mm'}, ''),
     'odometry': ((poses('/odom', 'Odometry'),), {}, ''),
     'covariance': ((poses('/pose', 'PoseWithCovarianceStamped'),), {}, ''),
@@ -131,9 +128,7 @@ DRIVERS = {
     'array': ((poses('/poses', 'PoseArray'),), {'pose_topic': '/poses[1]'}, 'as /poses[0]'),
     'abb_libegm': (egm_log, {}, ''),
     'abb_libegm joints': (egm_log, {'urdf': 'arm'}, ''),
-    'abb_motion_program_exec': (
-        program_log, {'urdf': 'arm', 'angle_unit': 'deg'}, 'give --angle-unit deg'
-    ),
+    'abb_motion_program_exec': (program_log, {'urdf': 'arm', 'angle_unit': 'deg'}, '--angle-unit'),
 }  # fmt: skip
 
 

@@ -74,9 +74,11 @@ def test_each_known_layout_has_its_case():
     assert not [name for name in layouts if not any(case.startswith(name) for case in CASES)]
 
 
-def test_what_the_gauge_marks_as_failed_is_counted(points):
+def test_failed_readings_are_counted_and_few_of_many_points_warned_of(points, file):
     readings = read_readings(LAYOUTS / 'coatmaster.csv', points)
     assert '1 row without a reading, 1 of them failed by error' in readings.understood
+    (doubt,) = read_readings(file('f.csv', 'Point;DFT\nP1;20\nP1;21\n'), points).doubts
+    assert doubt.startswith('only 1 of the 4 points in points.csv have a reading; see whether')
 
 
 def test_the_last_columns_of_a_measuring_machine_are_the_normal():
@@ -124,11 +126,6 @@ def test_columns_of_repeats_and_a_layer_that_is_none_can_be_named(file, points):
 def test_a_count_or_a_wrong_label_names_no_point(text, message, file, points):
     with pytest.raises(ReadingsError, match=message):
         read_readings(file('f.csv', text), points)
-
-
-def test_a_template_of_which_little_was_measured_is_warned_of(file, points):
-    (doubt,) = read_readings(file('f.csv', 'Point;DFT\nP1;20\nP1;21\n'), points).doubts
-    assert doubt.startswith('only 1 of the 4 points in points.csv have a reading; see whether')
 
 
 def test_a_folder_or_a_zip_with_several_tables_is_refused(tmp_path):
@@ -227,24 +224,21 @@ def test_open_document_whose_empty_rest_is_said_to_repeat(tmp_path):
 # What else shops have: each is read as these readings, or refused with the reason.
 PLACED = 'Punkt;X [mm];Y [mm];Z [mm];Dicke [µm]\nA1;100,0;0;50;21,5\nA2;100,0;0;200;22,1\n'
 SHEET = ['Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Dicke [µm]']
+FIRST, SECOND = ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, 22.1]
 IN_CELLS = {
     'units below, a title above': [
         ['Schichtdicke Tür'], ['Messpunkt', 'X', 'Y', 'Z', 'Dicke'],
         [None, 'mm', 'mm', 'mm', 'µm'],
-        ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, '22,1'],
+        FIRST, [*SECOND[:4], '22,1'],
     ],
-    'statistics without labels': [
-        SHEET, ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, 22.1], [], [None] * 4 + [21.8],
-    ],
+    'statistics without labels': [SHEET, FIRST, SECOND, [], [None] * 4 + [21.8]],
 }  # fmt: skip
 REFUSED_CELLS = {
     'stands over several columns or is a title': [[*SHEET, None], ['A1', 100, 0, 50, 21.5, 22]],
     "'12.5' beside it in line 3 has no heading": [
         ['Dicke', None, None], ['Ort', 'Basis', 'Klar'], ['A1', 12.5, 21.5],
     ],
-    "sheet 'S', row 3: Dicke .* is '#DIV/0!'; expected .* or n/a where": [
-        SHEET, ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, '#DIV/0!'],
-    ],
+    "sheet 'S', row 3: Dicke .* is '#DIV/0!'; expe": [SHEET, FIRST, [*SECOND[:4], '#DIV/0!']],
     "sheet 'S', row 3: X .* is ''": [SHEET, ['A1', 100, 0, 50, 21.5], [None] * 4 + [21.5]],
 }  # fmt: skip
 

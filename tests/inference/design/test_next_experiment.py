@@ -55,7 +55,7 @@ def drift_or_tool(drifting, fit):
 
 
 @pytest.mark.slow
-def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drifting, drift_or_tool):
+def test_a_rolled_gun_tells_air_from_a_tool_and_places_lie_apart(drifting, drift_or_tool, study):
     """The air drifts in the booth, the tool is off in its own frame."""
     by_changes = {spray.changes: spray for spray in drift_or_tool[1]}
     rolled = by_changes['roll_180',]
@@ -75,10 +75,6 @@ def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drifting, drift_or_to
     points = drifting.campaign.experiments[0].measured_points
     (row,) = np.flatnonzero((points.positions_m == at).all(axis=1))
     assert told['film_um'] == pytest.approx(drifting.measured_um[row])
-
-
-@pytest.mark.slow
-def test_places_lie_on_the_surface_apart_and_off_the_edge(study, fit, drift_or_tool):
     places, _ = drift_or_tool
     positions = np.array([place.position_m for place in places])
     surface = study.campaign.experiments[0].surface
@@ -179,7 +175,7 @@ def log_odds_drawn(told: Forecast, true: int, other: int) -> np.ndarray:
     return told.odds[true, other] + laws[true].logpdf(readings) - laws[other].logpdf(readings)
 
 
-def test_the_log_odds_are_those_of_readings_that_are_drawn():
+def test_the_log_odds_are_those_of_drawn_readings_and_nothing_tells_between_the_same():
     told = forecast()
     for true, other in ((0, 1), (1, 0), (0, 2)):
         drawn = log_odds_drawn(told, true, other)
@@ -187,9 +183,6 @@ def test_the_log_odds_are_those_of_readings_that_are_drawn():
         error = drawn.std() / np.sqrt(DRAWS)
         assert told.odds[true, other] + mean == pytest.approx(drawn.mean(), abs=4.0 * error)
         assert variance == pytest.approx(drawn.var(), rel=0.05)
-
-
-def test_nothing_tells_between_explanations_that_say_the_same():
     told = forecast()
     means, factors = np.tile(told.means[0], (3, 1)), np.tile(told.factors[0], (3, 1, 1))
     same = replace(told, log_weight=np.zeros(3), means=means, factors=factors)

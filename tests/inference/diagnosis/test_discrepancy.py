@@ -43,7 +43,7 @@ def between(study: Study, covariance: np.ndarray, one: int, other: int) -> np.nd
     return covariance[np.ix_(owner == one, owner == other)]
 
 
-def test_choices_are_covariances_and_as_probable_as_one(discrepancy, alone):
+def test_choices_are_as_probable_as_one_also_with_what_an_earlier_job_says(discrepancy, alone):
     for found, repeated in ((discrepancy, True), (alone[1], False)):
         choices = found.choices()
         for sizes in choices:
@@ -60,9 +60,6 @@ def test_choices_are_covariances_and_as_probable_as_one(discrepancy, alone):
     usual = [sizes for sizes in discrepancy.choices() if not sizes.is_beyond_nature]
     best = max(usual, key=lambda sizes: sizes.log_prior)
     assert (best.setting, best.part) == (0.02, 0.01)
-
-
-def test_what_an_earlier_job_says_of_the_footprint_is_a_prior_of_its_size(discrepancy):
     told = replace(discrepancy, known_footprint=(PRIOR.footprints[0], 1.1)).choices()
     prior = np.zeros(len(PRIOR.footprints))
     for sizes in told:

@@ -263,7 +263,7 @@ def test_the_band_holds_curves_of_the_prior_as_often_as_it_says(law):
     assert np.mean(held, axis=0) == pytest.approx(np.full(KNOTS, 0.95), abs=0.05)
 
 
-def test_the_band_is_wide_where_readings_are_few_and_no_wider_than_before_them(law):
+def test_the_band_is_wide_where_readings_are_few_and_not_for_a_level_of_the_pattern(law):
     random = np.random.default_rng(4)
     fit = fitted(law, np.zeros(KNOTS), random)
     sd, before = law.sd(fit.amplitudes[1]), law.sd(np.eye(law.at_knots.shape[1]))
@@ -271,10 +271,7 @@ def test_the_band_is_wide_where_readings_are_few_and_no_wider_than_before_them(l
     assert (sd < before).all()
     doubled = replace(fit, nuisance=0.5 * fit.nuisance, jacobian=0.5 * fit.jacobian)
     assert (law.sd(doubled.amplitudes[1]) > 1.2 * sd).all()
-
-
-def test_a_level_that_the_pattern_takes_up_does_not_widen_the_band(law):
-    """It would hide the form: the level of pattern and factor together is known, not each."""
+    # A level would hide the form: that of pattern and factor together is known, not each.
     covariance = fitted(law, np.zeros(KNOTS), np.random.default_rng(5)).amplitudes[1]
     level = np.sqrt(np.diag(law.at_knots @ covariance @ law.at_knots.T)).min()
     assert level > 2.0 * np.median(law.sd(covariance))

@@ -167,7 +167,7 @@ def covered(values) -> list[bool]:
     return [v.low <= getattr(WIDE, v.name) <= v.high for v in values if v.name in names]
 
 
-def test_paint_beyond_the_readings_is_that_of_the_normal_distribution():
+def test_paint_beyond_the_readings_is_that_of_the_normal_and_none_is_not_warned_of():
     """A pattern of one Gaussian leaves a Gaussian across the pass."""
     sigma_m = 0.2
     gaussian = pd.DepositionModel(planar=PlanarPattern(K2=1.0, K3=0.0, sigma2_m=sigma_m))
@@ -180,9 +180,6 @@ def test_paint_beyond_the_readings_is_that_of_the_normal_distribution():
     assert reach.needed_m == pytest.approx(norm.isf(0.025) * sigma_m, rel=1e-3)
     for enough in ((wide,), (narrow, wide)):
         assert short_reaches(pd.Campaign(enough), gaussian) == ()
-
-
-def test_a_panel_that_shows_both_edges_is_not_warned_of():
     result = calibrate(panel_campaign(1.4, (0.7,)))
     assert not any('lands further out' in warning for warning in result.warnings)
     assert len(result.shifts) == 0

@@ -158,16 +158,12 @@ def test_a_thick_film_without_texture_is_no_broken_fit():
 NOISE_UM, SCANNED = 0.4, 6000
 
 
-@pytest.fixture(scope='module')
-def scan() -> pd.Campaign:
-    """A panel read at random places, denser than any cell."""
+def test_the_mean_of_a_cell_is_its_film_and_readings_by_hand_beside_a_scan_are_kept():
+    """A panel is read at random places, denser than any cell."""
     places = np.random.default_rng(5).uniform((-0.35, 0.05), (0.35, 1.95), (SCANNED, 2))
     points_m = np.column_stack([places[:, 0], np.zeros(SCANNED), places[:, 1]])
-    motion = passes(ORDERS[0], samples=80)
-    return pd.Campaign((painted_by(MODEL, motion, points_m, noise_um=NOISE_UM, repeats=1),))
-
-
-def test_the_mean_of_a_cell_is_the_film_at_its_middle_within_the_noise_of_a_mean(scan):
+    motion, noise = passes(ORDERS[0], samples=80), {'noise_um': NOISE_UM, 'repeats': 1}
+    scan = pd.Campaign((painted_by(MODEL, motion, points_m, **noise),))
     # Off by a tenth of the film, as a rough fit may be.
     planar = MODEL.planar.model_copy(update={'K1_cm3_per_s': 1.1 * MODEL.planar.K1_cm3_per_s})
     cells = cleaning.condensed(scan, MODEL.model_copy(update={'planar': planar}))
@@ -179,9 +175,6 @@ def test_the_mean_of_a_cell_is_the_film_at_its_middle_within_the_noise_of_a_mean
     # Chi-square of that many cells: within five of its standard deviations.
     five_sd = 5.0 * np.sqrt(2.0 / len(cells))
     assert np.mean((off_um / sigma_um) ** 2) == pytest.approx(1.0, abs=five_sd)
-
-
-def test_a_few_readings_by_hand_beside_a_scan_are_kept_and_what_became_of_it_is_said(scan):
     motion = passes(ORDERS[1], samples=80)
     hand = painted_by(MODEL, motion, column(), name='by hand', noise_um=NOISE_UM)
     study = pd.compare(pd.Campaign((*scan.experiments, hand)), MODEL).study

@@ -52,16 +52,13 @@ def test_the_posterior_of_a_job_is_the_prior_of_the_next_widened(parameters, cam
     assert prior.factor @ prior.factor.T == pytest.approx(widened, rel=1e-6, abs=1e-12)
 
 
-def test_effects_are_told_in_their_own_units(campaign):
+def test_effects_are_told_in_their_own_units_and_the_unknown_keeps_its_weak_prior(campaign):
     fit = linear_fit(np.random.default_rng(2), 60, parameters=WITH_EFFECT)
     vector = WITH_EFFECT.encode(WITH_EFFECT.start)
     told = posterior_of(replace(fit, vector=vector), campaign).mean
     assert told['corner_slowdown.gain'] == pytest.approx(0.5)
     assert np.exp(told['corner_slowdown.log_length_m']) == pytest.approx(0.2)
     assert np.exp(told['log_K1']) == pytest.approx(pd.DepositionModel().planar.K1_cm3_per_s)
-
-
-def test_what_nothing_is_known_of_keeps_its_weak_prior():
     both = replace(WITH_EFFECT, known=correlated(PARAMETERS)).prior
     alone = KNOWN.prior
     count = len(PATTERN)
@@ -71,7 +68,7 @@ def test_what_nothing_is_known_of_keeps_its_weak_prior():
     assert not both.factor[count:, :count].any()
 
 
-def test_no_reading_counts_twice(panel, campaign):
+def test_no_reading_counts_twice_and_other_settings_of_the_process_are_told(panel, campaign):
     fit = linear_fit(np.random.default_rng(4), 60)
     posterior = posterior_of(fit, campaign)
     assert posterior.readings == (panel.taken.fingerprint,)
@@ -84,9 +81,6 @@ def test_no_reading_counts_twice(panel, campaign):
     later = replace(fit, parameters=replace(fit.parameters, known=posterior))
     (added,) = (part.taken.fingerprint for part in other.experiments)
     assert posterior_of(later, other).readings == (*posterior.readings, added)
-
-
-def test_other_settings_of_the_process_are_told(panel):
     calibrated = pd.Campaign((replace(panel, settings={'voltage_kv': 60.0, 'flow': 1.0}),))
     posterior = posterior_of(linear_fit(np.random.default_rng(4), 60), calibrated)
     assert posterior.process == {'voltage_kv': 60.0, 'flow': 1.0}

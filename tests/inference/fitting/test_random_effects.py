@@ -164,14 +164,9 @@ def test_a_level_that_no_other_part_tells_is_no_error_on_a_part_left_out():
     assert found < 0.1 * np.mean(study.measured_um)
 
 
-@pytest.fixture(scope='module')
-def study_and_fit():
-    return clean_and_fit(levelled(MISSING), BASE)
-
-
-def test_readings_left_out_have_no_part_in_what_is_predicted(study_and_fit):
+def test_readings_left_out_have_no_part_in_what_is_predicted_and_a_fitted_direction_has():
     """However wrong they are: neither by themselves nor by the level of their part."""
-    study, fit = study_and_fit
+    study, fit = clean_and_fit(levelled(MISSING), BASE)
     out = study.campaign.experiment_of == 1
     first, part, last = study.campaign.experiments
     wrong = reading(part, part.readings.thickness_um + 100.0)
@@ -179,11 +174,7 @@ def test_readings_left_out_have_no_part_in_what_is_predicted(study_and_fit):
     assert (other.measured_um[out] > study.measured_um[out] + 99.0).all()
     before, after = (one.predicted_without_um(fit, out) for one in (study, other))
     assert after == pytest.approx(before, rel=1e-4, abs=1e-3)
-
-
-def test_a_direction_that_is_fitted_too_counts_as_predicted(study_and_fit):
-    """What is learned beside the model from the other parts is predicted on the last."""
-    study, fit = study_and_fit
+    # What is learned beside the model from the other parts is predicted on the last.
     out = study.campaign.experiment_of == 2
     predict = study.forward.predict_um
     edge_um = predict(fit.model.with_effect(MISSING.effects[0])) - predict(fit.model)

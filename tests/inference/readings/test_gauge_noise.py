@@ -62,7 +62,7 @@ def test_normal_readings_stay_and_their_noise_is_unbiased(layout):
     assert np.mean(dropped) < 2e-3
 
 
-def test_one_slip_does_not_raise_the_noise():
+def test_one_slip_does_not_raise_the_noise_and_what_is_left_out_is_named():
     labels, thickness = honest_pairs()
     readings = at_points(labels + 'xxx', [*thickness, 15.5, 26.6, 26.1])
     noise = gauge_noise(readings)
@@ -70,6 +70,10 @@ def test_one_slip_does_not_raise_the_noise():
     honest = gauge_noise(readings.select(~noise.gross))
     assert noise.sigma_um[:20] == pytest.approx(honest.sigma_um[:20])
     assert noise.degrees_of_freedom == honest.degrees_of_freedom == 11
+    read = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
+    one, other = repeats.left_out_lines(read, np.array([False, True, False, False, True]))
+    assert one.startswith("point 'a': 15.5, 26.25 µm contradict each other; left out of the fit")
+    assert other.startswith("point 'b': 4 µm beside 20, 20.5; left out of the fit")
 
 
 @pytest.mark.parametrize(
@@ -95,18 +99,15 @@ def test_the_minority_at_a_point_is_wrong(thickness, gross):
     assert not found[:20].any()
 
 
-def test_without_enough_repeats_only_what_no_gauge_reads_is_gross():
+def test_without_repeats_only_what_no_gauge_reads_is_gross_and_usual_noise_is_assumed():
     for thickness, gross in (([26.0, 45.0, 20.0], [True, True, False]),
                              ([26.0, 32.0, 20.0], [False] * 3), ([], [])):  # fmt: skip
         found = gross_outliers(at_points('aab'[: len(gross)], thickness))
         assert found.tolist() == gross
-
-
-def test_what_is_left_out_is_named():
-    read = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
-    one, other = repeats.left_out_lines(read, np.array([False, True, False, False, True]))
-    assert one.startswith("point 'a': 15.5, 26.25 µm contradict each other; left out of the fit")
-    assert other.startswith("point 'b': 4 µm beside 20, 20.5; left out of the fit")
+    for labels, thickness in (('ab', [20.0, 30.0]), ('a' * 9, [20.0] * 9)):
+        noise = gauge_noise(at_points(labels, thickness))
+        assert (noise.source, noise.degrees_of_freedom) == ('assumed', repeats.ASSUMED_FREEDOM)
+        assert noise.sigma_um == pytest.approx(usual_noise_um(np.array(thickness)))
 
 
 def test_repeats_are_averaged_in_order_and_one_label_at_two_places_is_refused():
@@ -120,13 +121,6 @@ def test_repeats_are_averaged_in_order_and_one_label_at_two_places_is_refused():
     taken.require_repeats_close(pd.Readings.of(places[:2], [1.0, 2.0], point=labels[:2]))
     with pytest.raises(ReadingsError, match=r"point 'A' is used 0\.050 m apart"):
         taken.require_repeats_close(pd.Readings.of(places, [1.0, 2.0, 3.0], point=labels))
-
-
-def test_without_scatter_to_go_by_the_usual_noise_is_assumed():
-    for labels, thickness in (('ab', [20.0, 30.0]), ('a' * 9, [20.0] * 9)):
-        noise = gauge_noise(at_points(labels, thickness))
-        assert (noise.source, noise.degrees_of_freedom) == ('assumed', repeats.ASSUMED_FREEDOM)
-        assert noise.sigma_um == pytest.approx(usual_noise_um(np.array(thickness)))
 
 
 def test_noise_is_pooled_within_points_beside_those_whose_noise_is_stated():

@@ -131,15 +131,12 @@ def painted():
     return surface, film, stats
 
 
-def test_figures_of_any_kind_are_written(painted, tmp_path):
+def test_figures_of_any_kind_are_written_and_an_older_film_stays_unless_told(painted, tmp_path):
     """Mesh and table are held against each other where `paint simulate` is tried out."""
     details, stats = {'poses': np.int64(7), 'rate': math.inf}, painted[-1]
     *_, figures = write_film(tmp_path / 'new', *painted, details=details)
     content = json.loads(figures.read_text())
     assert (content['mean_um'], content['poses'], content['rate']) == (stats.mean_um, 7, None)
-
-
-def test_an_older_film_stays_unless_told(painted, tmp_path):
     surface, film, stats = painted
     csv = write_film(tmp_path, surface, film, stats)[1]
     with pytest.raises(pd.PaintError, match=r'film\.ply is there already'):
@@ -168,15 +165,11 @@ def file(tmp_path_factory, fitted) -> Path:
 
 
 @pytest.mark.slow
-def test_fitted_numbers_have_few_digits_and_those_by_hand_all_of_theirs(file: Path):
+def test_fitted_numbers_have_few_digits_and_give_the_fitted_film(file, fitted):
     numbers = re.findall(r': (-?[\d.]+)(?:e[+-]?\d+)?\b', file.read_text())
     assert len(numbers) > 10
     long = [n for n in numbers if len(n.lstrip('-0.').replace('.', '')) > 8]
     assert long == [str(BY_HAND)]
-
-
-@pytest.mark.slow
-def test_the_file_gives_the_fitted_film(file: Path, fitted):
     experiment = fitted.study.campaign.experiments[1]
 
     def film_on_vertices_um(model: pd.DepositionModel) -> np.ndarray:
