@@ -22,13 +22,6 @@ pytestmark = pytest.mark.slow
 BASE, SHIELDING = pd.DepositionModel(), EFFECTS['faraday_shielding']
 
 
-def library_of(family: str) -> dict:
-    """All effects of a family, and the first one of every other."""
-    firsts = {effect.family: name for name, effect in reversed(EFFECTS.items())}
-    names = [name for name, effect in EFFECTS.items() if effect.family == family]
-    return {name: EFFECTS[name] for name in (*names, *firsts.values())}
-
-
 @pytest.fixture(scope='module')
 def shielded(tmp_path_factory):
     """A door with a shielded valley."""
@@ -37,7 +30,7 @@ def shielded(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def found(shielded):
-    return diagnose(shielded, BASE, library_of('curvature'))
+    return diagnose(shielded, BASE, EFFECTS)
 
 
 @pytest.fixture(scope='module')
@@ -125,7 +118,7 @@ def test_what_a_footprint_could_show_as_well_is_blamed_on_nothing_else(tmp_path)
     """Displacement with the square of the way; a tilted gun and a shifted part look like it."""
     hidden = {'seed': 1, 'truth': 'air_drift~square', 'amplitude': 0.04, 'readings': 120}
     campaign = small_campaign(tmp_path, **DOOR | hidden)
-    diagnosis = diagnose(campaign, BASE, library_of('lateral shift'))
+    diagnosis = diagnose(campaign, BASE, EFFECTS)
     named = {m for c in diagnosis.classes if c.best in diagnosis.accepted for m in c.members}
     families = {EFFECTS[name].family for name in named if name in EFFECTS}
     assert families <= {'lateral shift'}
