@@ -17,11 +17,7 @@ from reference import reference_film_um
 
 ALL = [*EFFECTS.values(), read_effect_file(booth.SAMPLES / 'my_effect.py')]
 AMPLITUDES = [(effect, name) for effect in ALL for name in effect.amplitudes()]
-TWO_SIDED = [
-    (effect, name)
-    for effect, name in AMPLITUDES
-    if effect.parameters()[name]['low'] < effect.parameters()[name]['neutral']
-]
+
 WITH_LAW = [e for e in ALL if e.flux_factor is not None or e.pattern_scale is not None]
 LEARNED_LAWS = [law for law in CURVES.values() if law.flux_factor is not None]
 UNIT_SUFFIXES = {
@@ -45,7 +41,7 @@ AMPLITUDE = pytest.mark.parametrize(('effect', 'name'), [case(*one) for one in A
 
 
 @EFFECT
-def test_it_says_what_it_is(effect: type[Effect]):
+def test_it_says_what_it_is_and_every_parameter_its_unit_bounds_and_size(effect):
     assert effect.__doc__
     assert effect.family
     assert effect.signature
@@ -56,10 +52,6 @@ def test_it_says_what_it_is(effect: type[Effect]):
         assert set(effect.rivals) <= set(EFFECTS) - {effect.id}
         assert all(effect.id in EFFECTS[rival].rivals for rival in effect.rivals)
         assert problem_in_words(effect) is None
-
-
-@EFFECT
-def test_every_parameter_states_its_unit_bounds_and_size(effect: type[Effect]):
     for name, described in effect.parameters().items():
         assert name.endswith(UNIT_SUFFIXES[described['unit']]), name
         assert described['low'] <= described['neutral'] < described['high']
@@ -81,10 +73,7 @@ def test_neutral_changes_nothing(effect: type[Effect]):
     for column in fields(PASSES):
         before, after = getattr(PASSES, column.name), getattr(path, column.name)
         np.testing.assert_allclose(after, before, rtol=1e-14, atol=1e-14, err_msg=column.name)
-    film_of, base = (
-        booth.painted(booth.door(), PASSES, effect()),
-        booth.painted(booth.door(), PASSES),
-    )
+    film_of, base = (booth.painted(booth.door(), PASSES, *e) for e in ((neutral,), ()))
     assert neutral.is_neutral
     assert np.array_equal(film_of.gauge_um, base.gauge_um)
     for law in (effect.flux_factor, effect.pattern_scale):
@@ -110,17 +99,13 @@ def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str
     surface = booth.panel_with_screen() if effect.id == 'occlusion' else booth.door()
 
     def slope(before: float, after: float) -> np.ndarray:
-        films = [
-            booth.painted(surface, PASSES, effect(**{name: value})).gauge_um
-            for value in (before, after)
-        ]
-        return (films[1] - films[0]) / (after - before)
+        acting = (effect(**{name: value}) for value in (before, after))
+        low, high = (booth.painted(surface, PASSES, one).gauge_um for one in acting)
+        return (high - low) / (after - before)
 
     forward = slope(neutral, neutral + step)
-    if (effect, name) in TWO_SIDED:
-        other = slope(neutral - step, neutral)
-    else:
-        other = slope(neutral, neutral + 0.5 * step)
+    two_sided = described['low'] < neutral
+    other = slope(neutral - step, neutral) if two_sided else slope(neutral, neutral + 0.5 * step)
     scale = np.linalg.norm(forward)
     assert scale > 0.0
     # One kernel's rounding against another's: shadows are another kernel.

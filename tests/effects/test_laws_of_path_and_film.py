@@ -17,9 +17,8 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 
-CONTEXT = PathContext(
-    MODEL.projection, np.array([0.0, 0.0, -1.0]), np.array([0.0, -1.0, 0.0]), np.zeros(3)
-)
+DOWN, OUTWARD = np.array([0.0, 0.0, -1.0]), np.array([0.0, -1.0, 0.0])
+CONTEXT = PathContext(MODEL.projection, DOWN, OUTWARD, np.zeros(3))
 RADIUS_M = 0.25
 
 
@@ -78,13 +77,10 @@ def blinking():
 
 @pytest.mark.parametrize(
     ('trajectory', 'fall_s', 'tolerance'),
-    [
-        (serpentine((0.1, -0.1)), 0.03, 2e-5),
-        (serpentine((0.1, -0.1), flow=0.5), 0.03, 2e-5),
-        (blinking(), 0.05, 5e-4),
-    ],
+    [*((serpentine((0.1, -0.1), flow=flow), 0.03, 2e-5) for flow in (1.0, 0.5)),
+     (blinking(), 0.05, 5e-4)],
     ids=['full flow', 'half flow', 'blinking'],
-)
+)  # fmt: skip
 def test_trigger_lag_solves_its_equation(trajectory, fall_s, tolerance):
     path = spray_path(trajectory, max_step_m=2e-4)[0]
     lagged = after(trigger_lag(rise_s=0.05, fall_s=fall_s), path)
@@ -110,12 +106,16 @@ def test_pose_lag_is_a_trigger_recorded_later(lag_s, flow):
     np.testing.assert_allclose(film, expected, atol=2e-3 * expected.max())
 
 
-def test_gun_wake_is_the_whole_pass_moved_back():
+def test_gun_wake_is_the_pass_moved_back_and_a_wrong_tcp_another_distance():
     trajectory = serpentine((0.0,), speed_m_per_s=0.35)
     moved = replace(trajectory, positions_m=trajectory.positions_m - [0.02 * 0.35, 0.0, 0.0])
     film = painted(panel(), trajectory, EFFECTS['gun_wake'](lag_s=0.02)).raw_um
     expected = painted(panel(), moved).raw_um
     np.testing.assert_allclose(film, expected, atol=1e-9 * expected.max())
+    wrong = EFFECTS['tcp_standoff'](offset_z_m=0.02)
+    film = painted(panel(), spot(standoff_m=0.25), wrong).raw_um
+    nearer = painted(panel(), spot(standoff_m=0.23)).raw_um
+    np.testing.assert_allclose(film, nearer, atol=1e-12 * nearer.max())
 
 
 def test_flow_drifts_from_pass_to_pass():
@@ -150,9 +150,8 @@ def test_what_flows_behind_a_closing_has_drifted_like_the_pass(lag):
 def test_film_on_surface_of_250_mm_radius(name, values, convex_um, flat_um, concave_um):
     effect, found = EFFECTS[name](**values), []
     for curvature in (-1.0 / RADIUS_M, 0.0, 1.0 / RADIUS_M):
-        point = SurfacePoints(
-            np.zeros((1, 3)), np.array([[0.0, -1.0, 0.0]]), curvature_per_m=np.array([curvature])
-        )
+        place, normal = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0]])[:, np.newaxis]
+        point = SurfacePoints(place, normal, curvature_per_m=np.array([curvature]))
         film_um = effect.on_film(np.array([20.0]), point)
         found += effect.on_gauge(film_um, point).tolist()
         if name == 'gauge_curvature_bias':
@@ -193,8 +192,8 @@ def test_sag_follows_the_closed_form_of_a_thin_film_on_a_wall():
     np.testing.assert_allclose(sagged[inside], expected[inside], atol=0.04 * moved_um)
 
 
-OFFSET_M = booth.MODEL.projection.emission_offset_m
-POINTS = booth.panel().points()
+OFFSET_M = MODEL.projection.emission_offset_m
+POINTS = panel().points()
 
 
 def rolled(trajectory: pd.Trajectory, angle_rad: float) -> pd.Trajectory:
@@ -205,22 +204,20 @@ def rolled(trajectory: pd.Trajectory, angle_rad: float) -> pd.Trajectory:
 
 def distance_ratio(standoff_m: float) -> float:
     """Distance from the emission point to the panel over that of the model plane."""
-    return (standoff_m + OFFSET_M) / booth.MODEL.projection.model_plane_m
+    return (standoff_m + OFFSET_M) / MODEL.projection.model_plane_m
 
 
 def moved_by_m(trajectory: pd.Trajectory, effect) -> np.ndarray:
     """How the spot's centroid moves: right and down [m]."""
-    before, after = (
-        booth.centroid_m(booth.painted(booth.panel(), trajectory, *effects).raw_um, POINTS)
-        for effects in ((), (effect,))
-    )
+    films = (painted(panel(), trajectory, *effects).raw_um for effects in ((), (effect,)))
+    before, after = (booth.centroid_m(film_um, POINTS) for film_um in films)
     return (after - before)[[0, 2]] * [1.0, -1.0]
 
 
 @pytest.mark.parametrize('standoff_m', [0.2, 0.35])
 @pytest.mark.parametrize('roll_rad', [0.0, 1.0])
 def test_drift_grows_with_the_distance_and_does_not_turn_with_the_gun(standoff_m, roll_rad):
-    motion = rolled(booth.spot(standoff_m=standoff_m), roll_rad)
+    motion = rolled(spot(standoff_m=standoff_m), roll_rad)
     moved = moved_by_m(motion, EFFECTS['air_drift'](shift_down_m=0.02, shift_across_m=-0.01))
     expected = distance_ratio(standoff_m) * np.array([-0.01, 0.02])
     np.testing.assert_allclose(moved, expected, atol=2e-5)
@@ -232,75 +229,62 @@ def test_an_offset_turns_with_the_gun(roll_rad):
     # Right-handed about the view of the gun: clockwise with x to the right and y down.
     cos, sin = np.cos(roll_rad), np.sin(roll_rad)
     expected = [0.01 * cos - 0.004 * sin, 0.01 * sin + 0.004 * cos]
-    np.testing.assert_allclose(
-        moved_by_m(rolled(booth.spot(), roll_rad), offset), expected, atol=1e-5
-    )
+    moved_m = moved_by_m(rolled(spot(), roll_rad), offset)
+    np.testing.assert_allclose(moved_m, expected, atol=1e-5)
 
 
 @pytest.mark.parametrize('standoff_m', [0.2, 0.3])
 @pytest.mark.parametrize(('axis', 'place'), [('y', 0), ('x', 2)])
 def test_a_tilt_moves_the_spot_by_the_standoff_times_its_tangent(standoff_m, axis, place):
     # The axis pierces the panel there; the centroid of an inclined spot lies beside its axis.
-    planar = booth.MODEL.planar.model_copy(
-        update={'K3': 0.0, 'r_m': 0.0, 'sigma1_m': 0.01, 'sigma2_m': 0.01}
-    )
-    narrow, fine = booth.MODEL.model_copy(update={'planar': planar}), booth.panel(0.1, 0.004)
+    spot_m = {'K3': 0.0, 'r_m': 0.0, 'sigma1_m': 0.01, 'sigma2_m': 0.01}
+    narrow, fine = MODEL.with_patterns([MODEL.planar.model_copy(update=spot_m)]), panel(0.1, 0.004)
     tilt = EFFECTS['tcp_tilt'](**{f'tilt_{axis}_rad': 0.08})
-    film_um = booth.painted(fine, booth.spot(standoff_m=standoff_m), tilt, model=narrow).raw_um
+    film_um = painted(fine, spot(standoff_m=standoff_m), tilt, model=narrow).raw_um
     moved_m = booth.centroid_m(film_um, fine.points())[place]
     assert moved_m == pytest.approx(standoff_m * np.tan(0.08), rel=0.01)
 
 
 def test_misalignment_is_the_part_moved():
-    drawn = booth.panel(0.4, 0.04)
-    fault = EFFECTS['part_misalignment'](
-        shift_down_m=0.03, shift_across_m=-0.02, shift_deep_m=0.01, yaw_rad=0.09
-    )
+    drawn = panel(0.4, 0.04)
+    shift = {'shift_down_m': 0.03, 'shift_across_m': -0.02, 'shift_deep_m': 0.01}
+    fault = EFFECTS['part_misalignment'](**shift, yaw_rad=0.09)
     seen_by_gun = Rotation.from_rotvec([0.0, -0.09, 0.0])  # about the outward normal, -y
     hung = pd.Surface(
         seen_by_gun.apply(drawn.vertices_m) + np.array([-0.02, 0.01, -0.03]), drawn.faces,
         seen_by_gun.apply(drawn.normals), drawn.vertex_areas_m2, drawn.down,
     )  # fmt: skip
-    motion = booth.serpentine((0.1, -0.1))
-    expected = booth.painted(hung, motion).raw_um
-    film = booth.painted(drawn, motion, fault).raw_um
+    motion = serpentine((0.1, -0.1))
+    expected = painted(hung, motion).raw_um
+    film = painted(drawn, motion, fault).raw_um
     np.testing.assert_allclose(film, expected, atol=1e-10 * expected.max())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize('standoff_m', [0.15, 0.4])
 def test_width_and_volume_go_with_powers_of_the_distance(standoff_m):
-    motion, ratio = booth.spot(standoff_m=standoff_m), distance_ratio(standoff_m)
-    plain = booth.spread_m(booth.painted(booth.panel(), motion).raw_um, POINTS)
+    motion, ratio = spot(standoff_m=standoff_m), distance_ratio(standoff_m)
+
+    def film_um(*effects) -> np.ndarray:
+        return painted(panel(), motion, *effects).raw_um
+
+    plain = booth.spread_m(film_um(), POINTS)
     for exponent in (-0.5, 0.8):
-        spread = booth.painted(
-            booth.panel(), motion, EFFECTS['pattern_spread'](exponent=exponent)
-        ).raw_um
+        spread = film_um(EFFECTS['pattern_spread'](exponent=exponent))
         assert booth.spread_m(spread, POINTS) / plain == pytest.approx(ratio**exponent, rel=1e-3)
         volume = booth.volume_cm3(spread, POINTS)
-        assert volume == pytest.approx(booth.MODEL.planar.K1_cm3_per_s, rel=1e-4)
-    lossy = booth.painted(
-        booth.panel(), motion, EFFECTS['standoff_efficiency'](exponent=0.7)
-    ).raw_um
-    expected = booth.MODEL.planar.K1_cm3_per_s * ratio**-0.7
+        assert volume == pytest.approx(MODEL.planar.K1_cm3_per_s, rel=1e-4)
+    lossy = film_um(EFFECTS['standoff_efficiency'](exponent=0.7))
+    expected = MODEL.planar.K1_cm3_per_s * ratio**-0.7
     assert booth.volume_cm3(lossy, POINTS) == pytest.approx(expected, rel=1e-4)
-
-
-def test_a_wrong_tcp_is_another_distance():
-    wrong = EFFECTS['tcp_standoff'](offset_z_m=0.02)
-    film = booth.painted(booth.panel(), booth.spot(standoff_m=0.25), wrong).raw_um
-    nearer = booth.painted(booth.panel(), booth.spot(standoff_m=0.23)).raw_um
-    np.testing.assert_allclose(film, nearer, atol=1e-12 * nearer.max())
 
 
 @pytest.mark.parametrize('attraction', [-1.0, 2.0])
 def test_attraction_goes_with_the_incidence_of_each_ray(attraction):
     effect = EFFECTS['incidence_attraction'](attraction=attraction)
-    plain, film = (
-        booth.painted(booth.panel(), booth.spot(), *effects).raw_um for effects in ((), (effect,))
-    )
+    plain, film = (painted(panel(), spot(), *effects).raw_um for effects in ((), (effect,)))
     distance_m = 0.25 + OFFSET_M
-    radius2 = (booth.panel().vertices_m[:, [0, 2]] ** 2).sum(axis=1)
+    radius2 = (panel().vertices_m[:, [0, 2]] ** 2).sum(axis=1)
     cos_incidence = distance_m / np.sqrt(distance_m**2 + radius2)
     expected = plain * (1.0 + attraction * (1.0 - cos_incidence))
     np.testing.assert_allclose(film, expected, atol=1e-11 * plain.max())
@@ -308,9 +292,9 @@ def test_attraction_goes_with_the_incidence_of_each_ray(attraction):
 
 @pytest.mark.parametrize('strength', [0.4, 1.0])
 def test_what_the_screen_hides_loses_its_share(strength):
-    part, path = booth.panel_with_screen(), booth.path_of(booth.spot())
-    plain = booth.painted(part, path).raw_um
-    film = booth.painted(part, path, EFFECTS['occlusion'](strength=strength)).raw_um
+    part, path = booth.panel_with_screen(), path_of(spot())
+    plain = painted(part, path).raw_um
+    film = painted(part, path, EFFECTS['occlusion'](strength=strength)).raw_um
     x, y, z = part.vertices_m.T
     # The screen 100 mm before the panel seen from the emission point 300 mm before it.
     shadow_m = 0.05 * 0.3 / 0.2

@@ -8,15 +8,10 @@ import pytest
 from numba import float32, float64, njit
 
 from booth import MODEL, door, painted, panel, path_of, serpentine, spot
+from paint_deposition.effects import learned_laws as laws
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.learned_curves import CURVES, LearnedCurve, along_path, at_points
-from paint_deposition.effects.learned_laws import (
-    WAVES,
-    LearnedFootprint,
-    LearnedMap,
-    PartGrid,
-    places_m,
-)
+from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedMap, PartGrid, places_m
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import collapse_um
 from paint_deposition.kernel.eq2_flux import Ray, in_precision
@@ -179,9 +174,8 @@ def grid_on(points: SurfacePoints, **more) -> PartGrid:
 
 def on_part(points: SurfacePoints = PANEL, learned=GRID, kind: str = 'factor') -> LearnedMap:
     """A map learned on one part; by default the panel of the booth."""
-    return LearnedMap(
-        maps=(grid_on(points),), kind=kind, learned=tuple(np.ravel(learned).tolist())
-    )
+    values = tuple(np.ravel(learned).tolist())
+    return LearnedMap(maps=(grid_on(points),), kind=kind, learned=values)
 
 
 def h_at(*places: tuple[float, float]) -> np.ndarray:
@@ -198,13 +192,10 @@ def test_it_has_its_values_row_by_row_from_the_lowest_linear_between_and_neutral
     np.testing.assert_allclose(h_at(*beyond), 0.0, atol=1e-12)
 
 
-def test_places_are_to_the_right_of_the_centre_and_above_it_as_the_gun_sees_the_part():
-    """The gun looks along +y at a panel in x and z: right is +x, up is +z."""
-    np.testing.assert_allclose(places_m(PANEL), PANEL.positions_m[:, [0, 2]], atol=1e-12)
-
-
 @pytest.mark.parametrize('kind', ['factor', 'addition'])
 def test_the_film_changes_by_the_map_on_its_part_and_on_no_other(kind):
+    """Places are to the right of its centre and above it, as the gun sees it: along +x and +z."""
+    np.testing.assert_allclose(places_m(PANEL), PANEL.positions_m[:, [0, 2]], atol=1e-12)
     law = on_part(kind=kind)
     film_um = np.linspace(5.0, 30.0, len(PANEL))
     h = grid_on(PANEL).weights(places_m(PANEL)) @ GRID.ravel()
@@ -230,10 +221,8 @@ def test_few_points_are_changed_as_they_are_among_many(kind, count):
 
 def test_each_part_follows_its_own_map():
     door_points = door().points()
-    both = LearnedMap(
-        maps=(grid_on(PANEL), grid_on(door_points, columns=2)),
-        learned=(*GRID.ravel().tolist(), 0.1, 0.2, 0.3, 0.4),
-    )
+    grids = grid_on(PANEL), grid_on(door_points, columns=2)
+    both = LearnedMap(maps=grids, learned=(*GRID.ravel().tolist(), 0.1, 0.2, 0.3, 0.4))
     film_um = np.full(len(PANEL), 20.0)
     assert np.array_equal(both.on_film(film_um, PANEL), on_part().on_film(film_um, PANEL))
     film_um = np.full(len(door_points), 20.0)
@@ -244,12 +233,10 @@ def test_each_part_follows_its_own_map():
     assert second.tolist() == [[0.1, 0.2], [0.3, 0.4]]
 
 
-# The footprint.
-
 REACH_M = 0.2
 STEP_M = REACH_M / 4
 # At each of five radii, of which the innermost has no direction.
-RINGS = np.random.default_rng(2).uniform(-0.15, 0.15, size=(5, WAVES))
+RINGS = np.random.default_rng(2).uniform(-0.15, 0.15, size=(5, laws.WAVES))
 RINGS[0, 1:] = 0.0
 FOOTPRINT = LearnedFootprint(reach_m=REACH_M, learned=tuple(RINGS.ravel()))
 
@@ -265,9 +252,8 @@ def test_the_compiled_factor_is_one_plus_h_in_its_own_precision(real, tolerance)
     compiled = njit(in_precision(FOOTPRINT.flux_factor, real))
     values = np.array(FOOTPRINT.values(), real)
     x_m, y_m = np.random.default_rng(3).uniform(-1.3 * REACH_M, 1.3 * REACH_M, size=(2, 60))
-    found = [
-        compiled(Ray(*np.array(at(x, y), real)), *values) for x, y in zip(x_m, y_m, strict=True)
-    ]
+    rays = (Ray(*np.array(at(x, y), real)) for x, y in zip(x_m, y_m, strict=True))
+    found = [compiled(ray, *values) for ray in rays]
     np.testing.assert_allclose(found, 1.0 + FOOTPRINT.h(x_m, y_m), rtol=tolerance)
     (signature,) = compiled.nopython_signatures
     assert signature.return_type == {np.float64: float64, np.float32: float32}[real]
@@ -280,28 +266,15 @@ def test_at_its_radii_it_has_the_mean_and_the_harmonics_that_were_given():
         radius = ring * STEP_M
         found = FOOTPRINT.h(radius * np.cos(angle), radius * np.sin(angle))
         np.testing.assert_allclose(found, values @ table, atol=1e-9)
-
-
-def test_between_two_radii_it_is_linear_and_one_step_beyond_reach_nothing():
     along = FOOTPRINT.h(np.array([1.0, 1.25, 2.0]) * STEP_M, np.zeros(3))
     assert along[1] == pytest.approx(0.75 * along[0] + 0.25 * along[2])
     beyond = np.array([REACH_M + STEP_M, 3.0 * REACH_M])
     assert FOOTPRINT.h(beyond, np.zeros(2)).tolist() == [0.0, 0.0]
     for radius in beyond:
         assert FOOTPRINT.flux_factor(at(0.0, radius), *FOOTPRINT.values()) == 1.0
-
-
-@pytest.mark.parametrize('x_m', [0.0, 1e-12])
-def test_at_the_very_centre_it_is_finite(x_m):
-    assert FOOTPRINT.flux_factor(at(x_m, 0.0), *FOOTPRINT.values()) == pytest.approx(
-        1.0 + RINGS[0, 0]
-    )
-
-
-def volume_um_m2(*effects) -> float:
-    """Paint on the panel in front of a gun that stands still for a second."""
-    surface = panel(0.5, 0.01)
-    return float(painted(surface, spot(), *effects).raw_um.sum())
+    for x_m in (0.0, 1e-12):
+        found = FOOTPRINT.flux_factor(at(x_m, 0.0), *FOOTPRINT.values())
+        assert found == pytest.approx(1.0 + RINGS[0, 0])
 
 
 def of_the_pattern(h) -> float:
@@ -314,8 +287,8 @@ def of_the_pattern(h) -> float:
 @pytest.mark.slow
 def test_the_paint_on_a_flat_panel_changes_as_the_integral_of_the_pattern():
     """All that passes the model plane lands on the panel, wherever it passes."""
-    expected = of_the_pattern(lambda x, y: 1.0 + FOOTPRINT.h(x, y)) / of_the_pattern(
-        lambda x, y: 1.0
-    )
+    with_it = of_the_pattern(lambda x, y: 1.0 + FOOTPRINT.h(x, y))
+    expected = with_it / of_the_pattern(lambda x, y: 1.0)
     assert abs(expected - 1.0) > 0.01
-    assert volume_um_m2(FOOTPRINT) / volume_um_m2() == pytest.approx(expected, abs=3e-4)
+    film, plain = (painted(panel(0.5, 0.01), spot(), *e).raw_um for e in ((FOOTPRINT,), ()))
+    assert film.sum() / plain.sum() == pytest.approx(expected, abs=3e-4)

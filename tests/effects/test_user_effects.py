@@ -62,12 +62,18 @@ def test_a_law_may_use_all_of_the_ray_and_numbers_of_its_module(own):
         assert compiled == pytest.approx(law(Ray(*map(float, ray)), 0.5), rel=1e-6)
 
 
-def test_the_same_file_is_the_same_class_and_can_go_to_another_process(own):
+def test_the_same_file_is_the_same_class_and_one_of_a_script_has_none(own, tmp_path):
     path = own()
     effect = load_effect_file(path)
     assert load_effect_file(str(path)) is effect
     assert effect.file == path
     assert pickle.loads(pickle.dumps(effect.typical())) == effect.typical()
+    spec = importlib.util.spec_from_file_location('script', own())
+    script = sys.modules['script'] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    model = pd.DepositionModel(effects=(script.WakeLoss(loss_per_m_per_s=0.3),))
+    with pytest.raises(ModelError, match="effect 'wake_loss' has no file; put WakeLoss in a file"):
+        pd.write_model(tmp_path / 'out.yaml', model)
 
 
 def line(text: str) -> list[tuple[str, str]]:
@@ -113,19 +119,17 @@ def shape(name: str, low: str) -> str:
         ([('return exp', "return open('x').read() + exp")], 'flux_factor that does not compile'),
         ([('return exp', 'return -exp')], 'a factor is 0 or more'),
         ([('return exp', 'retrun exp')], 'SyntaxError'),
+        ([('speed_m_per_s)\n', 'speed_m_per_s)\n\n\nclass Other(WakeLoss):\n    id = "other"\n')],
+         'has several effects (WakeLoss, Other)'),
         ([('kernel.fast_math', 'kernel.fast_maths')], 'line 7: ModuleNotFoundError'),
-        # Its other places are tried out.
-        (with_place('on_film(self, film_um, points)', 'return film_um[:2]'),
-         'not return a finite film'),
+        (film('return film_um[:2]'), 'not return a finite film'),
         (with_place('on_gauge(self, film_um, points)', 'return film_um / 0.0 * 0.0'),
          'not return a finite'),
-        (with_place('on_film(self, film_um, points)', 'return points.no_such'),
-         'fails (AttributeError'),
-        (with_place('on_path(self, path, context)', 'return None'), 'return path.with_(...)'),
+        (film('return points.no_such'), 'fails (AttributeError'),
+        (along('return None'), 'return path.with_(...)'),
         (film('film_um += 1.0; return film_um'), 'has an on_film that changes what it is given'),
         (film('return film_um.tolist()'), 'return an array with one finite number a point'),
-        (film('return film_um + (film_um > 9.0) * points.edge_distance_m'),
-         'has an on_film that does not return a finite film'),
+        (film('return film_um + (film_um > 9.0) * points.edge_distance_m'), 'a finite film'),
         (film('return film_um * 1.1'), 'has an on_film that changes something at the neutral'),
         (along('path.flow[:] = 1.0; return path'), 'has an on_path that changes what it is given'),
         (along('return path.with_(flow=path.flow[:, None])'), 'gives flow the shape'),
@@ -136,7 +140,6 @@ def shape(name: str, low: str) -> str:
         (with_place('shadow(self)', 'return 0.5'), 'has a shadow of 0.5 at the neutral values'),
         (with_place('shadow(self)', 'return 2.0'), 'has a shadow of 2; give 0 to 1'),
         (with_place('widening(self)', 'return 0.5'), 'has a widening of 0.5; give 1 to inf'),
-        # What it declares.
         ([('flux_factor', 'pattern_scale')], 'has a pattern_scale and no widening'),
         (with_place('reach(self)', 'return 2.0'), 'which is called widening now; rename it'),
         ([('high=2.0', "high=float('inf')")], 'loss_per_m_per_s high=inf; give a finite number'),
@@ -146,7 +149,6 @@ def shape(name: str, low: str) -> str:
         (line(shape('length_m', 'low=0.0')), 'gives the shape length_m low=0; a length or time'),
         (line(shape('length_m', 'low=2.0')), 'low=2 and high=2; high must be above low'),
         (line(shape('shadow', 'low=1.0')), 'has a parameter shadow, a name that every effect has'),
-        # How far a diagnosis may trust it.
         (line("needs = 'volts'"), "has needs = 'volts'; give one of voltage, draught"),
         (line("free_law = 'sum'"), "has free_law = 'sum'; give one of factor, addition"),
         (line("covariates = 'time_s'"), "has covariates = 'time_s'; give names, ('time_s',)"),
@@ -163,13 +165,6 @@ def test_what_is_wrong_is_said_in_one_line_with_its_remedy(own, changes, message
     assert '\n' not in str(refused.value)
 
 
-def test_two_effects_in_a_file_are_refused(own):
-    path = own()
-    path.write_text(SAMPLE + '\n\nclass Other(WakeLoss):\n    id = "other"\n')
-    with pytest.raises(ModelError, match=r'has several effects \(WakeLoss, Other\)'):
-        load_effect_file(path)
-
-
 def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
     text = (repository / 'docs/own_effect.md').read_text(encoding='utf-8')
     assert (SAMPLES / 'my_effect.py').relative_to(repository).as_posix() in text
@@ -178,26 +173,10 @@ def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
     for place in (*PLACES, 'widening'):
         assert f'`{place}(' in text
         assert hasattr(Effect, place)
-    context = (*(field.name for field in fields(PathContext)), 'downhill', 'across')
-    for name in (
-        *(field.name for field in fields(SprayPath)),
-        *context,
-        'slope_per_m',
-        *NEEDS[1:],
-    ):
+    columns = (field.name for of in (SprayPath, PathContext) for field in fields(of))
+    for name in (*columns, 'downhill', 'across', 'slope_per_m', *NEEDS[1:]):
         assert f'`{name}`' in text or f"`'{name}'`" in text or f"'{name}'`" in text
 
-
-def test_a_class_of_a_script_has_no_file_that_a_model_could_name(own, tmp_path):
-    spec = importlib.util.spec_from_file_location('script', own())
-    script = sys.modules['script'] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
-    model = pd.DepositionModel(effects=(script.WakeLoss(loss_per_m_per_s=0.3),))
-    with pytest.raises(ModelError, match="effect 'wake_loss' has no file; put WakeLoss in a file"):
-        pd.write_model(tmp_path / 'out.yaml', model)
-
-
-# An effect that is edited between runs.
 
 IMPORTED = """
 from numba import njit

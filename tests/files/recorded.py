@@ -34,10 +34,8 @@ def straight_pass(count: int = 50, triggers: bool = True, frame_id: str = 'door'
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
     if not triggers:
         return Trajectory(stamps_ns, positions_m, quaternions, frame_id)
-    switched_ns = stamps_ns[[count // 4, 3 * count // 4]]
-    return Trajectory(
-        stamps_ns, positions_m, quaternions, frame_id, switched_ns, np.array([1.0, 0.0])
-    )
+    switched_ns, flow = stamps_ns[[count // 4, 3 * count // 4]], np.array([1.0, 0.0])
+    return Trajectory(stamps_ns, positions_m, quaternions, frame_id, switched_ns, flow)
 
 
 class Messages:
@@ -105,15 +103,13 @@ def write_bag(
     messages = messages or Messages(ros1=storage == 'ros1')
     plugin = StoragePlugin.SQLITE3 if storage == 'sqlite3' else StoragePlugin.MCAP
     ros1 = storage == 'ros1'
-    with (
-        Ros1Writer(path) if ros1 else Ros2Writer(path, version=9, storage_plugin=plugin) as writer
-    ):
+    made = Ros1Writer(path) if ros1 else Ros2Writer(path, version=9, storage_plugin=plugin)
+    with made as writer:
         connections = {}
         for topic, log_time_ns, message in entries:
             if topic not in connections:
-                connections[topic] = writer.add_connection(
-                    topic, message.__msgtype__, typestore=messages.store
-                )
+                told = topic, message.__msgtype__
+                connections[topic] = writer.add_connection(*told, typestore=messages.store)
             writer.write(connections[topic], int(log_time_ns), messages.serialised(message))
     return path
 

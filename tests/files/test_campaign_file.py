@@ -10,6 +10,10 @@ import yaml
 import paint_deposition as pd
 
 SAMPLE = 'ros2_ws/src/paint_deposition/samples/measured_door'
+DOOR = {
+    'name': 'door', 'mesh': 'door.stl', 'trajectory': 'door', 'pose_topic': '/atomizer/pose',
+    'measurements': 'door.csv',
+}  # fmt: skip
 
 
 @pytest.fixture(scope='module')
@@ -23,11 +27,9 @@ def folder(repository, tmp_path_factory) -> Path:
 def campaign(folder):
     """`campaign(key=value, ...)`: a campaign file of one experiment with these keys changed."""
 
-    def write(top: dict | None = None, experiments: list | None = None, **changes: object) -> Path:
-        entry = {'name': 'door', 'mesh': 'door.stl', 'trajectory': 'door',
-                 'pose_topic': '/atomizer/pose', 'measurements': 'door.csv'} | changes  # fmt: skip
-        entry = {key: value for key, value in entry.items() if value is not ...}
-        content = {'experiments': experiments or [entry]} | (top or {})
+    def write(top: dict | None = None, **changes: object) -> Path:
+        entry = {key: value for key, value in (DOOR | changes).items() if value is not ...}
+        content = {'experiments': [entry]} | (top or {})
         path = folder / 'one.yaml'
         path.write_text(yaml.safe_dump(content))
         return path
@@ -38,8 +40,8 @@ def campaign(folder):
 def changed_readings(folder: Path, change) -> str:
     """A copy of the door's readings with `change(values)` made to every row; its name."""
     header, *rows = (folder / 'door.csv').read_text().splitlines()
-    lines = [','.join(change(dict(zip(header.split(','), row.split(','), strict=True))))
-             for row in rows]  # fmt: skip
+    fields = (dict(zip(header.split(','), row.split(','), strict=True)) for row in rows)
+    lines = [','.join(change(row)) for row in fields]
     (folder / 'changed.csv').write_text('\n'.join([header, *lines]) + '\n')
     return 'changed.csv'
 
@@ -69,6 +71,9 @@ def test_what_the_file_says_is_taken_over(campaign, folder):
     without = read.without(np.arange(len(read.readings)) == 0)
     assert without.head == read.head
     assert one.switched_off == without.experiments[0].switched_off == {*off}
+    assert read.target_of(one) == (25.0, 3.5)
+    own = pd.read_campaign(campaign(top=top, target_um=30, tolerance_um=5))
+    assert own.target_of(own.experiments[0]) == (30.0, 5.0)
 
 
 def test_a_trigger_that_is_not_named_is_noted(campaign):
@@ -91,10 +96,7 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'mesh_scale': 0}, 'mesh_scale is 0; expected a number above 0: metres per unit'),
         ({'max_pose_gap_s': 'long'}, "max_pose_gap_s is 'long'; expected a number above 0"),
         ({'down': 'z'}, r"down is 'z'; expected gravity in the mesh frame, three"),
-        (
-            {'down': [0, 0, float('nan')]},
-            r'down.2 is nan; expected gravity in the mesh frame, three',
-        ),
+        ({'down': [0, 0, float('nan')]}, 'down.2 is nan; expected gravity in the mesh frame'),
         ({'columns': {'thick': 'DFT'}}, "columns.thick is 'thick'; expected the heading.* x, y"),
         ({'columns': {'x': ['a', 'b']}}, 'x has one column; only thickness may have a list'),
         ({'columns': {'layers': 'a'}}, "give 'layers' the columns by the names of the layers"),
@@ -104,11 +106,9 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'top': {'models': 'm.yaml'}}, "campaign: unknown key 'models'; .* 'model'"),
         ({'top': {'experiments': []}}, r'experiments is \[\]; expected a list of at least one'),
         ({'top': {'target_um': 20}}, 'target_um and tolerance_um belong together'),
-        (
-            {'top': {'target_um': 45, 'tolerance_um': 60}},
-            'tolerance_um 60 is not less than target',
-        ),
+        ({'top': {'target_um': 45, 'tolerance_um': 60}}, 'tolerance_um 60 is not less than'),
         ({'top': {'target_um': -1, 'tolerance_um': 1}}, 'target_um is -1; expected the film want'),
+        ({'top': {'experiments': [DOOR, DOOR]}}, "two experiments are called 'door'; rename one"),
     ],
 )
 def test_a_fault_is_refused_in_one_line(campaign, changes, message):
@@ -119,26 +119,11 @@ def test_a_fault_is_refused_in_one_line(campaign, changes, message):
     assert '\n' not in str(refused.value)
 
 
-def test_two_experiments_need_two_names(campaign):
-    entry = {'name': 'door', 'mesh': 'door.stl', 'trajectory': 'door', 'measurements': 'door.csv'}
-    with pytest.raises(pd.PaintError, match="two experiments are called 'door'; rename one"):
-        pd.read_campaign(campaign(experiments=[entry, entry]))
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        (None, 'no such file; give a campaign YAML'),
-        ('just words', 'campaign is text; expected the keys experiments, '),
-    ],
-)
-def test_a_file_that_is_no_campaign_is_refused(tmp_path, text, message):
-    path = tmp_path / 'campaign.yaml'
-    if text is not None:
-        path.write_text(text)
-    with pytest.raises(pd.PaintError, match=message) as refused:
-        pd.read_campaign(path)
-    assert '\n' not in str(refused.value)
+def test_a_file_that_is_no_campaign_is_refused(tmp_path, file):
+    with pytest.raises(pd.PaintError, match='no such file; give a campaign YAML'):
+        pd.read_campaign(tmp_path / 'campaign.yaml')
+    with pytest.raises(pd.PaintError, match='campaign is text; expected the keys experiments, '):
+        pd.read_campaign(file('campaign.yaml', 'just words'))
 
 
 def test_readings_a_few_mm_off_are_moved_and_it_is_said(campaign, folder):
@@ -180,14 +165,6 @@ def test_teeth_of_a_comb_read_low_and_as_likely_anywhere_in_their_step(campaign,
     assert 'a comb in steps of 5 µm, half of which is added' in read.understood[0]
 
 
-def test_an_experiment_has_its_own_target(campaign):
-    read = pd.read_campaign(campaign(top={'target_um': 25, 'tolerance_um': 4}))
-    assert read.target_of(read.experiments[0]) == (25.0, 4.0)
-    top = {'target_um': 25, 'tolerance_um': 4}
-    read = pd.read_campaign(campaign(top=top, target_um=30, tolerance_um=5))
-    assert read.target_of(read.experiments[0]) == (30.0, 5.0)
-
-
 def test_what_an_experiment_says_of_its_motion_holds_for_its_guns(campaign):
     """Not the default of a gun that says nothing."""
     guns = [{'trajectory': 'door'}, {'trajectory': 'door', 'tool_axis': 'z'}]
@@ -200,7 +177,5 @@ def test_normals_pointing_into_the_part_are_refused(campaign, folder):
     rows = (folder / 'door.csv').read_text().splitlines()
     inward = [f'{rows[0]},nx,ny,nz', *(f'{row},0,-1,0' for row in rows[1:])]
     (folder / 'inward.csv').write_text('\n'.join(inward) + '\n')
-    with pytest.raises(
-        pd.PaintError, match=r'normals point away from the surface.*give outward normals'
-    ):
+    with pytest.raises(pd.PaintError, match='normals point away from the surface'):
         pd.read_campaign(campaign(measurements='inward.csv'))

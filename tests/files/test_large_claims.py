@@ -6,6 +6,7 @@ import shutil
 import struct
 import zipfile
 from collections.abc import Callable, Iterator
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 
@@ -102,6 +103,14 @@ def _repeated_cells() -> bytes:
     return open_document(open_row('point', 'thickness_um') + row)
 
 
+RAPID_BODIES = {
+    'arrays': b'VAR num x{1000,1000,1000}; x{1,1,1}:=1;',
+    'copies': b'VAR num x{100000}; VAR num y{100000}; FOR i FROM 1 TO 9999 DO y:=x; ENDFOR',
+    'strings': b'VAR string s:="a"; FOR i FROM 1 TO 9999 DO s:=s+s; ENDFOR',
+    'empty loops': b'FOR i FROM 1 TO 9998 DO FOR j FROM 1 TO 9998 DO ENDFOR ENDFOR',
+}
+
+
 def _row(text: bytes) -> bytes:
     sheet = targets()['worksheet']
     return sheet.seeds[0].replace(b'</sheetData>', text + b'><v>1</v></c></row></sheetData>')
@@ -136,29 +145,14 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'a far row of a workbook': ('worksheet', lambda: _row(b'<row r="1048576"><c r="XFD1"')),
     'repeated cells of an open document': ('workbook', _repeated_cells),
     'a cell no sheet has': ('worksheet', lambda: _row(b'<row r="1"><c r="AAAAA999999991"')),
-    'arrays of RAPID': ('rapid', lambda: _main(b'VAR num x{1000,1000,1000}; x{1,1,1}:=1;')),
-    'copies of RAPID': (
-        'rapid',
-        lambda: _main(
-            b'VAR num x{100000}; VAR num y{100000}; FOR i FROM 1 TO 9999 DO y:=x; ENDFOR'
-        ),
-    ),
-    'strings of RAPID': (
-        'rapid',
-        lambda: _main(b'VAR string s:="a"; FOR i FROM 1 TO 9999 DO s:=s+s; ENDFOR'),
-    ),
-    'empty loops of RAPID': (
-        'rapid',
-        lambda: _main(b'FOR i FROM 1 TO 9998 DO FOR j FROM 1 TO 9998 DO ENDFOR ENDFOR'),
-    ),
+    **{f'{name} of RAPID': ('rapid', partial(_main, body)) for name, body in RAPID_BODIES.items()},
     'calls of RAPID': ('rapid', _calls),
     'nested arrays of RAPID': (
-        'rapid',
-        lambda: RAPID.replace(b'[[0,0,0]', b'[' * 20_000 + b'[0,0,0]'),
+        'rapid', lambda: RAPID.replace(b'[[0,0,0]', b'[' * 20_000 + b'[0,0,0]'),
     ),
     'links of a URDF': ('urdf', lambda: b'<robot name="a">' + b'<link name="x">' * 20_000),
     'an array of RAPID': ('rapid', lambda: RAPID.replace(b'n{2}:=', b'n{1000000000}:=[[')),
-}
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -187,9 +181,7 @@ def test_what_a_head_claims_is_not_believed(what, tmp_path, little_memory):
         error = error.__cause__ or error.__context__
 
 
-def test_a_recording_that_was_compressed_as_a_whole_is_not_expanded_beyond_measure(
-    tmp_path, monkeypatch
-):
+def test_a_recording_compressed_as_a_whole_is_not_expanded_beyond_measure(tmp_path, monkeypatch):
     """20 MB of zeros in 3 kB, in a place of 10 MB."""
     monkeypatch.setattr(bag_files, 'MOST_FILE_BYTES', 10_000_000)
     run = Path(shutil.copytree(SAMPLES / 'panel_577', tmp_path / 'run'))

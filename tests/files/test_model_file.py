@@ -17,8 +17,6 @@ from paint_deposition.effects.learned_laws import (
     LearnedMap,
     PartGrid,
 )
-from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
-from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.effect_file import load_effect_file
@@ -43,15 +41,12 @@ def test_every_effect_reads_back(effect, tmp_path: Path):
     assert read_model(tmp_path / 'model.yaml') == model
 
 
-@pytest.mark.parametrize(
-    ('word', 'effects'), [('true', (Occlusion(strength=1.0),)), ('false', ())]
-)
-def test_shadows_of_the_projection_are_the_effect(tmp_path: Path, word, effects):
-    path = tmp_path / 'model.yaml'
-    path.write_text(f'projection: {{occlusion: {word}}}')
-    assert read_model(path) == DepositionModel(effects=effects)
-    write_model(path, read_model(path))
-    assert read_model(path) == DepositionModel(effects=effects)
+def test_shadows_of_the_projection_are_the_effect(file):
+    for word, effects in (('true', (EFFECTS['occlusion'](strength=1.0),)), ('false', ())):
+        path = file('model.yaml', f'projection: {{occlusion: {word}}}')
+        assert read_model(path) == DepositionModel(effects=effects)
+        write_model(path, read_model(path))
+        assert read_model(path) == DepositionModel(effects=effects)
 
 
 def test_the_text_is_plain_yaml_with_a_comment_on_every_number(tmp_path: Path):
@@ -75,6 +70,7 @@ def test_name_uncertainty_and_history_read_back(tmp_path: Path):
     assert file.name == 'yes: no'
     assert file.uncertainty == {'planar': {'K2': 0.01}, 'effects': {'sag': {'run_m': 1e-7}}}
     assert file.history == [{'added': 'sag', 'p_value': 0.5, 'rmse_um': [2.0, 0.75]}]
+    assert file.posterior is None
 
 
 def test_a_users_effect_is_found_beside_the_model_file(tmp_path: Path):
@@ -92,9 +88,8 @@ def learned(law: type[LearnedLaw]) -> LearnedLaw:
     """One whose numbers are none that a short decimal says."""
     third, kind = 1.0 / 3.0, law.kinds[-1]
     if law is LearnedMap:
-        grid = PartGrid(
-            part_m=(1.0, third, 2.0), low_m=(-third, 0.0), high_m=(0.1, third), columns=3, rows=2
-        )
+        ends = {'low_m': (-third, 0.0), 'high_m': (0.1, third)}
+        grid = PartGrid(part_m=(1.0, third, 2.0), **ends, columns=3, rows=2)
         return law(maps=(grid, grid), kind=kind, learned=(0.1, -third, 1e-7) * 4)
     if law is LearnedFootprint:
         return law(reach_m=third, learned=(0.1, -third, 1e-7, 0.0, 2.0) * 3)
@@ -124,10 +119,7 @@ MAP = 'covariate: place, maps: [{part_m: [1, 1, 1], high_m: [0.5, 0.5], rows: 2'
         ('covariate: time_s, sd: [1]', 'sd has 1 values and learned 2; give one for each'),
         ('covariate: time_s, sd: [0.1, -0.2]', 'sd has -0.2; a standard deviation is 0 or more'),
         ('covariate: edge_distance_m, low: 0.4, high: 0.5', 'must be above low'),
-        (
-            'covariate: height_fraction, kind: sum',
-            "kind is 'sum'; expected 'factor' or 'addition': 1 + h times",
-        ),
+        ('covariate: height_fraction, kind: sum', "'sum'; expected 'factor' or 'addition': 1 + h"),
         ('covariate: time_s, learned: [0.1, .nan]', 'learned.1 is nan; expected a list'),
         ('covariate: time_s, kind: addition', "kind is 'addition'; over time_s give factor"),
         ('covariate: place, learned: [1, 2, 3]', 'has 3 values; its maps have 4 knots'),
@@ -144,12 +136,13 @@ def test_what_is_no_learned_law_is_said_in_one_line(file, entry: str, message: s
 
 
 def test_what_is_left_out_has_its_default(file):
-    assert read_model(file('model.yaml', 'planar: {K2: 0.3}')) == DepositionModel(
-        planar=PlanarPattern(K2=0.3)
-    )
-    assert read_model(file('model.yaml', 'effects:')).effects == ()
-    assert read_model(file('model.yaml', 'planar: {K2: 1e-2}')).planar.K2 == 0.01
-    assert read_model(file('model.yaml', 'effects: [{id: air_drift}]')).effects[0].is_neutral
+    def read(text: str) -> DepositionModel:
+        return read_model(file('model.yaml', text))
+
+    assert read('planar: {K2: 0.3}') == DepositionModel(planar=PlanarPattern(K2=0.3))
+    assert read('effects:').effects == ()
+    assert read('planar: {K2: 1e-2}').planar.K2 == 0.01
+    assert read('effects: [{id: air_drift}]').effects[0].is_neutral
 
 
 @pytest.mark.parametrize(
@@ -158,8 +151,7 @@ def test_what_is_left_out_has_its_default(file):
         ('planar: {K2: 2}', 'planar: K2 is 2; expected a number 0 to 1: K2, weight'),
         ('planar: {K1_cm3_per_s: 0}', 'K1_cm3_per_s is 0; expected a number above 0 and up to'),
         ('planar: {K2: true}', 'K2 is True; expected a number'),
-        ('planar: {K2: 3, K3: 4}', 'K2 is 3; expected a number 0 to 1: K2, weight of the centred '
-         'Gaussian [1] (and 1 more)'),
+        ('planar: {K2: 3, K3: 4}', 'weight of the centred Gaussian [1] (and 1 more)'),
         ('planar: {K1: 2}', "planar: unknown key 'K1'; did you mean 'K1_cm3_per_s'"),
         ('planar: [1]', 'planar is [1]; expected a mapping (key: value)'),
         ('planr: {}', "model: unknown key 'planr'; did you mean 'planar'"),
@@ -182,6 +174,14 @@ def test_what_is_left_out_has_its_default(file):
         ('planar: {K2: .1, K2: .2}', 'cannot be read as YAML (line 1: found duplicate key "K2"'),
         ('planar: {K2: 2024-13-45}', 'put such a value in quotes'),
         ('planar:\n  K2: [', 'cannot be read as YAML (line 2: '),
+        ('brushes: {}', 'brushes is empty; give a brush by its number, or planar'),
+        ('brushes: {0: {planar: {}}}', 'brushes: 0 is not a brush number; give 1, 2 and so on'),
+        ('brushes: {1: 3}', 'brushes, 1 is 3; expected the keys '),
+        ('brushes: {1: {planer: {}}}', "brushes, 1: unknown key 'planer'; did you mean 'planar'?"),
+        ('brushes: {1: {planar: {}, solids: 45}}', 'brushes, 1: solids is 45; expected a number'),
+        ('brushes: {1: {planar: {K2: 2}}}', 'brushes, 1: planar: K2 is 2; expected a number 0 '),
+        ('brushes: {1: {solids: 0.4}}', 'brushes, 1: planar is missing; calibrate the brush, or'),
+        ('planar: {}\nbrushes: {1: {planar: {}}}', 'planar and brushes are both given; keep one'),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_one_line(file, text: str, message: str):
@@ -205,42 +205,31 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-CORNERS = DepositionModel(effects=(CornerSlowdown(gain=0.5, length_m=0.2),))
+CORNERS = DepositionModel(effects=(EFFECTS['corner_slowdown'](gain=0.5, length_m=0.2),))
 NAMES = [*(c.name for c in PATTERN), 'corner_slowdown.gain', 'corner_slowdown.log_length_m']
 
 
-def covariance() -> np.ndarray:
-    root = np.random.default_rng(0).normal(size=(len(NAMES), len(NAMES)))
-    return 1e-4 * root @ root.T
+ROOT = np.random.default_rng(0).normal(size=(len(NAMES), len(NAMES)))
+COVARIANCE = 1e-4 * ROOT @ ROOT.T
+POSTERIOR = Posterior(
+    mean={name: 0.1 * k for k, name in enumerate(NAMES)},
+    covariance=dict(zip(NAMES, COVARIANCE.tolist(), strict=True)),
+    readings=('0123456789ab',), process={'voltage_kv': 60.0},
+)  # fmt: skip
 
 
 @pytest.fixture
-def posterior() -> Posterior:
-    return Posterior(
-        mean={name: 0.1 * k for k, name in enumerate(NAMES)},
-        covariance=dict(zip(NAMES, covariance().tolist(), strict=True)),
-        readings=('0123456789ab',),
-        process={'voltage_kv': 60.0},
-    )
-
-
-@pytest.fixture
-def with_posterior(tmp_path: Path, posterior: Posterior) -> Path:
-    write_model(tmp_path / 'model.yaml', CORNERS, posterior=posterior)
+def with_posterior(tmp_path: Path) -> Path:
+    write_model(tmp_path / 'model.yaml', CORNERS, posterior=POSTERIOR)
     return tmp_path / 'model.yaml'
 
 
-def test_a_posterior_reads_back(with_posterior: Path, posterior: Posterior):
+def test_a_posterior_reads_back(with_posterior: Path):
     again = read_model_file(with_posterior).posterior
-    assert again == posterior
+    assert again == POSTERIOR
     assert again.names == tuple(NAMES)
     assert again.centre == pytest.approx(0.1 * np.arange(len(NAMES)))
-    assert again.matrix == pytest.approx(covariance())
-
-
-def test_a_file_without_one_has_none(tmp_path: Path):
-    write_model(tmp_path / 'model.yaml', CORNERS)
-    assert read_model_file(tmp_path / 'model.yaml').posterior is None
+    assert again.matrix == pytest.approx(COVARIANCE)
 
 
 def fewer(section):
@@ -259,9 +248,7 @@ def fewer(section):
         (lambda s: s.update(covarianc={}), "unknown key 'covarianc'; did you mean 'covariance'"),
     ],
 )
-def test_what_is_wrong_with_a_posterior_is_said_in_one_line(
-    with_posterior: Path, change, words: str
-):
+def test_what_is_wrong_with_a_posterior_is_said_in_one_line(with_posterior, change, words):
     content = yaml.safe_load(with_posterior.read_text())
     change(content['posterior'])
     with_posterior.write_text(yaml.safe_dump(content, sort_keys=False))
@@ -270,9 +257,7 @@ def test_what_is_wrong_with_a_posterior_is_said_in_one_line(
     assert words in message
 
 
-def test_files_have_the_rights_of_the_process_and_its_umask_is_never_changed(
-    tmp_path: Path, monkeypatch
-):
+def test_files_have_the_rights_of_the_process_whose_umask_is_not_changed(tmp_path, monkeypatch):
     before = os.umask(0o027)
     # The mask belongs to the process: two threads that set it and put it back can leave it at 0.
     monkeypatch.setattr(os, 'umask', lambda mask: pytest.fail('the umask was changed'))

@@ -17,7 +17,6 @@ from paint_deposition.film.statistics import seconds_by_pattern
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import TriggerChange
-from paint_deposition.motion.trajectory import Trajectory
 from scenes import events, lying_plane, painted, stamps_ns, straight_pass, weaving
 
 MODEL = two_brushes()
@@ -29,22 +28,13 @@ CHANGES = switched(
 )  # fmt: skip
 
 
-def with_one_brush(motion: Trajectory, number: int) -> Trajectory:
-    """The same with the gun open while this brush is chosen only."""
-    return replace(
-        motion, trigger_flow=np.where(motion.trigger_brush == number, motion.trigger_flow, 0.0)
-    )
-
-
 def test_two_brushes_on_one_part_lay_the_sum_of_their_films():
     motion, points = replace(weaving(TIMES_S), **CHANGES), lying_plane()
-    both = painted(points, motion, MODEL, precision='double')
-    apart = [
-        painted(points, one_brush, DepositionModel(planar=planar), precision='double')
-        for planar, one_brush in (
-            (NARROW, with_one_brush(motion, 1)), (WIDE, with_one_brush(motion, 2))
-        )
-    ]  # fmt: skip
+    both, apart = painted(points, motion, MODEL, precision='double'), []
+    for number, planar in ((1, NARROW), (2, WIDE)):
+        flow = np.where(motion.trigger_brush == number, motion.trigger_flow, 0.0)
+        alone, model = replace(motion, trigger_flow=flow), DepositionModel(planar=planar)
+        apart.append(painted(points, alone, model, precision='double'))
     total = sum(one.film_um for one in apart)
     # Sub-steps are not cut where both sides of a change are without paint.
     assert np.abs(both.film_um - total).max() < 2e-4 * total.max()
@@ -57,35 +47,37 @@ def test_two_brushes_on_one_part_lay_the_sum_of_their_films():
 @pytest.mark.parametrize('number', [0, 5])
 def test_one_brush_is_its_pattern_to_the_last_bit(number):
     brush = {'trigger_brush': np.where(CHANGES['trigger_flow'] > 0.0, number, 0)}
-    motion = replace(weaving(TIMES_S), **{**CHANGES, **brush})
-    plain = painted(
-        lying_plane(), replace(motion, trigger_brush=np.empty(0, np.int64)), DepositionModel()
-    )
-    one = DepositionModel(brushes=[Brush(number=5, planar=DepositionModel().planar)])
-    assert np.array_equal(painted(lying_plane(), motion, one).film_um, plain.film_um)
+    motion, model = replace(weaving(TIMES_S), **CHANGES | brush), DepositionModel()
+    unnamed = replace(motion, trigger_brush=np.empty(0, np.int64))
+    plain = painted(lying_plane(), unnamed, model).film_um
     # A cell that numbers its only brush needs no other model.
-    assert np.array_equal(painted(lying_plane(), motion, DepositionModel()).film_um, plain.film_um)
+    for one in (DepositionModel(brushes=[Brush(number=5, planar=model.planar)]), model):
+        assert np.array_equal(painted(lying_plane(), motion, one).film_um, plain)
 
 
 @pytest.mark.parametrize('lag_s', [0.03, -0.03])
 def test_a_lag_takes_the_brush_along(lag_s):
-    motion = replace(
-        straight_pass(TIMES_S),
-        **switched(stamps_ns([0.5, 1.5, 2.5, 3.0]), (1.0, 2), (0.0, 2), (1.0, 1), (0.0, 0)),
-    )
+    stamps = stamps_ns([0.5, 1.5, 2.5, 3.0])
+    changes = switched(stamps, (1.0, 2), (0.0, 2), (1.0, 1), (0.0, 0))
+    motion = straight_pass(TIMES_S, **changes)
     model = MODEL.with_effect(PoseLag(lag_s=lag_s))
     path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
     sprayed, _ = FilmIntegrator(lying_plane(), model).sprayed(path)
     assert seconds_by_pattern(model, sprayed) == pytest.approx([0.5, 1.0], rel=1e-9)
 
 
-def test_terms_are_kept_apart_by_brush():
+def test_terms_are_kept_apart_by_brush_and_brushes_are_in_order_each_once():
     path, _ = spray_path(replace(weaving(TIMES_S), **CHANGES))
     film = FilmIntegrator(lying_plane(), MODEL, 'double', parallel=False)
     terms = film.terms(film.steps(path))
     weights = np.concatenate([term_weights(planar)[0] for planar in MODEL.patterns])
     film.add(path)
     assert np.abs(weights @ terms - film.film_um).max() < 1e-9 * film.film_um.max()
+    one, two = MODEL.brushes
+    assert DepositionModel(brushes=(two, one)) == MODEL
+    assert MODEL.planar == NARROW
+    with pytest.raises(ValueError, match='the same number'):
+        DepositionModel(brushes=(one, one))
 
 
 def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():
@@ -98,7 +90,6 @@ def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():
         film.add_trigger(TriggerChange(int(stamps_ns(0.5)), 1.0, 3))
     with pytest.raises(ModelError, match=r'^no brush is named; its brushes: 1, 2$'):
         film.add_trigger(TriggerChange(int(stamps_ns(0.5)), 1.0))
-    # A closed gun has no brush.
     film.add_trigger(TriggerChange(int(stamps_ns(0.6)), 0.0, 3))
     assert [event.brush for event in film.log.events()] == [2, 3]
 
@@ -110,16 +101,12 @@ def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():
         (DepositionModel(), ((1.0, 1),), '4 states left out: brushes 1, 2 are used and the model'),
     ],
 )
-def test_states_that_a_model_refuses_are_left_out_as_a_live_film_leaves_them_out(
-    model, others, warning
-):
+def test_states_that_a_model_refuses_are_left_out_as_by_a_live_film(model, others, warning):
     """Of one pattern without a number the first brush is the only one."""
     told = [(1.0, 1) if len(model.brushes) else (0.4, 1), *others, (1.0, 2), (0.8, 7), (0.0, 2),
             (1.0, 2), (1.0, 1), (0.6, 2), (0.7, 2)]  # fmt: skip
-    motion = replace(
-        weaving(TIMES_S), **switched(stamps_ns(0.2 + 0.3 * np.arange(len(told))), *told),
-        source='run',
-    )  # fmt: skip
+    changes = switched(stamps_ns(0.2 + 0.3 * np.arange(len(told))), *told)
+    motion = replace(weaving(TIMES_S), **changes, source='run')
     film = LiveFilm(lying_plane(), model)
     for event in events(motion, 20):
         with contextlib.suppress(ModelError):
@@ -129,11 +116,3 @@ def test_states_that_a_model_refuses_are_left_out_as_a_live_film_leaves_them_out
     assert taken.warnings[0].startswith(f'run: {warning}')
     with pytest.raises(ModelError, match=r'^run: brush'):
         without_refused_states(motion, model, strict=True)
-
-
-def test_brushes_are_in_the_order_of_their_numbers_each_once():
-    one, two = MODEL.brushes
-    assert DepositionModel(brushes=(two, one)) == MODEL
-    assert MODEL.planar == NARROW
-    with pytest.raises(ValueError, match='the same number'):
-        DepositionModel(brushes=(one, one))

@@ -50,19 +50,23 @@ def test_coats_add_up_to_the_film_of_their_guns(panel, painted, wet_on_wet):
     assert sum(volumes) == pytest.approx(film.statistics.painted_volume_cm3)
 
 
-def test_dried_coats_sag_each_by_itself_and_wet_ones_as_one(panel):
+def test_dried_coats_sag_each_by_itself_wet_ones_as_one_and_a_film_that_runs_away_is_told(panel):
     """Paint runs with the cube of the wet film: twice the film runs eight times as much."""
     plain, once = (pd.simulate(panel, BASE, model).film_um for model in (PLAIN, SAGGING))
     run_um = once - plain
     for wet_on_wet, times in ((False, 2.0), (True, 8.0)):
-        film = pd.simulate(
-            panel, [BASE, BASE], SAGGING, coats=['base', 'clear'], wet_on_wet=wet_on_wet
-        )
+        coats = {'coats': ['base', 'clear'], 'wet_on_wet': wet_on_wet}
+        film = pd.simulate(panel, [BASE, BASE], SAGGING, **coats)
         assert film.film_um - 2.0 * plain == pytest.approx(times * run_um, abs=1e-9)
         assert np.array_equal(film.coats[0].film_um, once)
         added = sum(coat.film_um for coat in film.coats)
         assert added == pytest.approx(film.film_um, abs=1e-12)
     assert np.abs(run_um).max() > 0.1
+    # The law is of first order: pushed too far it takes away more than is there.
+    said = 'and no film is below 0: the law of sag does not hold at this size'
+    for count, warned in ((1, False), (8, True)):
+        warnings = pd.simulate(panel, [BASE] * count, SAGGING).warnings
+        assert any(said in warning for warning in warnings) == warned
 
 
 def test_the_gauge_is_one_and_each_dried_coat_may_sag_by_its_own(panel):
@@ -112,11 +116,3 @@ def test_what_a_coat_adds_to_a_wet_film_is_the_film_less_that_before():
 def test_names_that_do_not_go_are_refused(names, message):
     with pytest.raises(PaintError, match=message):
         Coats.of_guns(names, 3)
-
-
-def test_a_film_that_runs_away_is_warned_of(panel):
-    """The law of sag is of first order: pushed too far it takes away more than is there."""
-    said = 'and no film is below 0: the law of sag does not hold at this size'
-    for count, warned in ((1, False), (8, True)):
-        warnings = pd.simulate(panel, [BASE] * count, SAGGING).warnings
-        assert any(said in warning for warning in warnings) == warned

@@ -12,7 +12,7 @@ from booth import MODEL, path_of, serpentine
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.spray_geometry import facet_error, facet_errors_um
 from paint_deposition.part.points import SurfacePoints
-from surfaces import triangulated
+from surfaces import refined, triangulated
 
 PATH = path_of(serpentine((0.3, 0.1, -0.1, -0.3), half_width_m=0.7, opens_at_m=0.65))
 BELL = pd.DepositionModel()
@@ -65,16 +65,20 @@ def cap(radius_m: float) -> Curve:
     return Curve(lambda x, z: radius_m - root(x, z), lambda x, z: (x / root(x, z), z / root(x, z)))
 
 
+def films_um(*places: SurfacePoints) -> list[np.ndarray]:
+    films = []
+    for points in places:
+        painted = FilmIntegrator(points, BELL)
+        painted.add(PATH)
+        films.append(painted.film_um)
+    return films
+
+
 def told_and_true(curve: Curve, edge_m: float, jitter: float) -> tuple[float, float]:
     """The error told, and the worst one over the refined mesh, as shares of the peak."""
     vertices, faces = triangulated(curve.depth, edge_m, 0.12, jitter=jitter)
     surface = pd.Surface.from_triangles(vertices, faces, min(0.01, edge_m / 2.0))
-    exact_m, normals = curve.nearest(surface.vertices_m)
-    films = []
-    for points in (surface.points(), SurfacePoints(exact_m, normals)):
-        painted = FilmIntegrator(points, BELL)
-        painted.add(PATH)
-        films.append(painted.film_um)
+    films = films_um(surface.points(), SurfacePoints(*curve.nearest(surface.vertices_m)))
     told = facet_error(surface, PATH, BELL)[0]
     return told, np.abs(films[0] - films[1]).max() / films[1].max()
 
@@ -82,10 +86,8 @@ def told_and_true(curve: Curve, edge_m: float, jitter: float) -> tuple[float, fl
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ('curve', 'edge_m', 'jitter'),
-    [
-        (round_fold(0.04, 30.0), 0.012, 0.0), (round_fold(0.08, 45.0), 0.024, 0.3),
-        (cap(0.5), 0.05, 0.3),
-    ],
+    [(round_fold(0.04, 30.0), 0.012, 0.0), (round_fold(0.08, 45.0), 0.024, 0.3),
+     (cap(0.5), 0.05, 0.3)],
 )  # fmt: skip
 def test_the_error_is_told_within_a_third(curve, edge_m, jitter):
     told, true = told_and_true(curve, edge_m, jitter)
@@ -93,24 +95,21 @@ def test_the_error_is_told_within_a_third(curve, edge_m, jitter):
 
 
 def test_flat_and_sharp_parts_cost_nothing():
-    vertices, faces = triangulated(lambda x, z: 0.3 * x, 0.1)
-    flat = pd.Surface.from_triangles(vertices, faces, 0.02)
+    flat = refined(lambda x, z: 0.3 * x, 0.1, 0.02)
     body = box((0.4, 0.3, 0.3))
     sharp = pd.Surface.from_triangles(body.vertices, np.asarray(body.faces), 0.02)
-    bent = pd.Surface.from_triangles(*triangulated(lambda x, z: 0.7 * np.abs(z), 0.1), 0.02)
+    bent = refined(lambda x, z: 0.7 * np.abs(z), 0.1, 0.02)
     for surface in (flat, sharp, bent):
         assert facet_error(surface, PATH, MODEL) == (0.0, '')
 
 
 def test_the_warning_names_the_place_and_a_length_that_helps():
-    curve = round_fold(0.08, 45.0)
-    vertices, faces = triangulated(curve.depth, 0.024, 0.12)
-    share, warning = facet_error(pd.Surface.from_triangles(vertices, faces, 0.01), PATH, BELL)
+    depth = round_fold(0.08, 45.0).depth
+    share, warning = facet_error(refined(depth, 0.024, half_width_m=0.12), PATH, BELL)
     assert share > 0.02
     assert abs(float(warning.split(') m')[0].split(', ')[-1])) < 0.08
     wanted_m = 1e-3 * float(warning.split('edges of about ')[1].split(' mm')[0])
-    vertices, faces = triangulated(curve.depth, wanted_m, 0.12)
-    finer, _ = facet_error(pd.Surface.from_triangles(vertices, faces, 0.01), PATH, BELL)
+    finer, _ = facet_error(refined(depth, wanted_m, half_width_m=0.12), PATH, BELL)
     assert finer < 0.5 * share
 
 
@@ -120,11 +119,7 @@ def test_the_error_at_readings_is_most_of_the_true_one(curve):
     at = np.random.default_rng(0).choice(len(surface.vertices_m), 200, replace=False)
     points = SurfacePoints(surface.vertices_m[at], surface.normals[at])
     told_um = facet_errors_um(surface, points, PATH, BELL)
-    films = []
-    for places in (points, SurfacePoints(*curve.nearest(points.positions_m))):
-        painted = FilmIntegrator(places, BELL)
-        painted.add(PATH)
-        films.append(painted.film_um)
-    true_um = films[1] - films[0]
+    flat_um, exact_um = films_um(points, SurfacePoints(*curve.nearest(points.positions_m)))
+    true_um = exact_um - flat_um
     assert np.corrcoef(told_um, true_um)[0, 1] > 0.8
     assert np.std(true_um - told_um) < 0.6 * np.std(true_um)

@@ -22,10 +22,8 @@ def flux_um_per_s(model, position, normal, tcp, rotation):
     """Eq. (2) of one point for one pose, by the paper; all numbers of fifty digits."""
     plane, pattern = mpf(model.projection.model_plane_m), model.planar
     axes = [[mpf(value) for value in column] for column in rotation.T.tolist()]
-    emission = [
-        mpf(place) - mpf(model.projection.emission_offset_m) * axis
-        for place, axis in zip(tcp.tolist(), axes[2], strict=True)
-    ]
+    behind = mpf(model.projection.emission_offset_m)
+    emission = [mpf(at) - behind * axis for at, axis in zip(tcp.tolist(), axes[2], strict=True)]
     ray = [mpf(place) - start for place, start in zip(position.tolist(), emission, strict=True)]
     x, y, z = (mpmath.fdot(ray, axis) for axis in axes)
     length = mpmath.sqrt(mpmath.fdot(ray, ray))
@@ -68,9 +66,8 @@ def worlds():
                 phi_rad=rng.uniform(-3, 3), r_m=rng.uniform(0.02, 0.25),
                 sigma1_m=rng.uniform(0.02, 0.1), sigma2_m=rng.uniform(0.02, 0.15),
             )  # fmt: skip
-            projection = Projection(
-                model_plane_m=rng.uniform(0.15, 0.5), emission_offset_m=rng.uniform(0.0, 0.1)
-            )
+            plane_m, offset_m = rng.uniform(0.15, 0.5), rng.uniform(0.0, 0.1)
+            projection = Projection(model_plane_m=plane_m, emission_offset_m=offset_m)
             model = DepositionModel(planar=planar, projection=projection)
             normals = rng.normal([0.0, 0.0, 2.0], 1.0, size=(POINTS, 3))
             normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -108,8 +105,5 @@ def test_the_film_is_right_to_its_last_digits(worlds, precision, tolerance):
         largest = max(film)
         assert largest > 0.01
         with mpmath.workdps(50):
-            off = max(
-                abs(mpf(float(ours)) - exact)
-                for ours, exact in zip(integrator.film_um, film, strict=True)
-            )
-            assert off < tolerance * largest
+            both = zip(integrator.film_um.tolist(), film, strict=True)
+            assert max(abs(mpf(ours) - exact) for ours, exact in both) < tolerance * largest

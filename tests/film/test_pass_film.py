@@ -55,14 +55,19 @@ def test_film_integrator_lays_the_same_pass(name, standoff_m, travel_rad):
     assert np.abs(painted - direct).max() < 1e-10 * direct.max()
 
 
-def test_volume_is_kept_at_any_standoff_and_direction():
+def test_volume_is_kept_and_the_half_width_is_where_the_profile_has_half_its_peak():
     model = model_of(RING)
     for standoff, travel in [(0.1, 0.3), (0.25, 0.0), (0.6, 2.0)]:
         pass_ = sampled_collapse(model, 0.3, standoff_m=standoff, travel_rad=travel)
         assert pass_.area_um_m == pytest.approx(RING.K1_cm3_per_s / 0.3, rel=1e-9)
+    pass_ = sampled_collapse(model_of(PlanarPattern(K3=0.0)), 0.2)
+    half = 0.5 * half_width_m(pass_)
+    peak = pass_.thickness_um(ACROSS_M).max()
+    assert pass_.thickness_um(np.array([half])) == pytest.approx(0.5 * peak, rel=0.01)
+    assert half_width_m(pass_) == pytest.approx(0.574, abs=1e-3)
 
 
-def test_gun_kept_in_its_orientation_lays_one_profile_both_ways():
+def test_a_gun_lays_one_profile_both_ways_and_drifting_air_shifts_it_down_whichever():
     bare = model_of(RING)
     wake = model_of(RING, EFFECTS['gun_wake'](lag_s=0.03))
     # A wake moves the kink of eq. (1) off the finest sub-steps.
@@ -73,9 +78,6 @@ def test_gun_kept_in_its_orientation_lays_one_profile_both_ways():
         turned = collapse_um(model, ACROSS_M, SPEED_M_PER_S, backwards=True, turned=True)
         np.testing.assert_allclose(turned, forth[::-1], atol=precision * forth.max())
         assert np.abs(turned - forth).max() > 0.05 * forth.max()
-
-
-def test_drifting_air_shifts_the_profile_down_whichever_way_the_gun_is_turned():
     model = model_of(RING, EFFECTS['air_drift'](shift_down_m=0.03))
     for turned in (False, True):
         still = collapse_um(model_of(RING), ACROSS_M + 0.03, 0.2, turned=turned)
@@ -93,23 +95,11 @@ def test_sampled_collapse_is_the_collapse(name):
     assert sampled.thickness_um(np.array([sampled.reach_m + 0.01]))[0] == 0.0
 
 
-def test_half_width_is_where_the_profile_has_half_its_peak():
-    pass_ = sampled_collapse(model_of(PlanarPattern(K3=0.0)), 0.2)
-    half = 0.5 * half_width_m(pass_)
-    peak = pass_.thickness_um(ACROSS_M).max()
-    assert pass_.thickness_um(np.array([half])) == pytest.approx(0.5 * peak, rel=0.01)
-    assert half_width_m(pass_) == pytest.approx(0.574, abs=1e-3)
-
-
 @pytest.mark.parametrize(
     ('speed', 'standoff', 'offset', 'remedy'),
-    [
-        (0.0, 0.25, 0.05, 'give a number above 0'),
-        (-1.0, 0.25, 0.05, 'give a number above 0'),
-        (0.2, 0.0, 0.05, 'give a number above 0'),
-        (0.2, 0.03, -0.04, r'0.04 m in front of the TCP: give a standoff above 0.041'),
-    ],
-)
+    [*((*wrong, 0.05, 'give a number above 0') for wrong in ((0.0, 0.25), (-1.0, 0.25), (0.2, 0))),
+     (0.2, 0.03, -0.04, r'0.04 m in front of the TCP: give a standoff above 0.041')],
+)  # fmt: skip
 def test_impossible_passes_are_refused(speed, standoff, offset, remedy):
     model = DepositionModel(projection=Projection(emission_offset_m=offset))
     for one in (model, model.with_effect(EFFECTS['gun_wake'].typical())):

@@ -31,11 +31,7 @@ PLANE = lying_plane(0.7, 72)
 
 @st.composite
 def models(draw) -> pd.DepositionModel:
-    """A narrow pattern, so that all of it meets the part, and the laws of one of LAWS.
-
-    Eq. (1) has no one value at the centre of an uneven ring. The ring is hollow here, so that a
-    sum over points 20 mm apart is off by less than 0.4 % for it.
-    """
+    """A narrow pattern, hollow, so that a sum over points 20 mm apart is off by under 0.4 %."""
     planar = PlanarPattern(
         K1_cm3_per_s=draw(st.floats(0.1, 10.0)), K2=draw(st.floats(0.0, 1.0)),
         K3=draw(st.floats(0.0, 1.0)), phi_rad=draw(st.floats(-3.1, 3.1)),

@@ -1,7 +1,6 @@
 """Figures of a film and of its paint against what can be worked out by hand."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,20 +9,16 @@ import scenes
 from brushes import NARROW, WIDE, switched
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
+from paint_deposition.film import statistics
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.film.statistics import (
-    PaintUsed,
-    efficiency,
-    film_statistics,
-    impossible_brushes,
-)
+from paint_deposition.film.statistics import PaintUsed, efficiency, film_statistics
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.zones import Box, PointZones, Zone, Zones
 from scenes import lying_plane, stamps_ns, straight_pass
 
 
-def test_area_weighs_not_the_number_of_vertices():
+def test_area_weighs_and_is_shared_by_below_within_and_above():
     film = np.array([10.0, 10.0, 10.0, 30.0])
     area = np.array([0.1, 0.1, 0.1, 0.3])
     stats = film_statistics(film, area, emitted_cm3=15.0)
@@ -33,44 +28,33 @@ def test_area_weighs_not_the_number_of_vertices():
     assert stats.capture_fraction == pytest.approx(0.8, rel=1e-12)
     assert stats.std_dev_um == pytest.approx(10.0, rel=1e-12)
     assert (stats.min_um, stats.max_um) == (10.0, 30.0)
+    film, area = np.array([0.0, 10.0, 20.0, 30.0]), np.array([5.0, 0.2, 0.5, 0.3])
+    stats = film_statistics(film, area, 1.0, target_um=20.0, target_tolerance_um=5.0)
+    shares = stats.below_target, stats.within_target, stats.above_target
+    assert shares == pytest.approx((0.2, 0.5, 0.3))
+    with pytest.raises(PaintError, match='tolerance_um 20 is not less than target_um 20: bare'):
+        film_statistics(np.ones(1), np.ones(1), 1.0, target_um=20.0, target_tolerance_um=20.0)
 
 
-def test_bare_metal_and_dust_count_for_coverage_and_volume_only():
+def test_bare_metal_counts_for_coverage_and_volume_only_and_figures_say_what_is_not_known():
     film, area = np.array([0.0, 0.5, 20.0]), np.array([0.5, 0.25, 0.25])
     stats = film_statistics(film, area, emitted_cm3=10.0, painted_above_um=1.0)
     assert stats.coverage == pytest.approx(0.25)
     assert stats.mean_um == stats.min_um == stats.max_um == 20.0
     assert stats.painted_volume_cm3 == pytest.approx(0.125 + 5.0)
-
-
-def test_below_within_and_above_share_the_painted_area():
-    film, area = np.array([0.0, 10.0, 20.0, 30.0]), np.array([5.0, 0.2, 0.5, 0.3])
-    stats = film_statistics(film, area, 1.0, target_um=20.0, target_tolerance_um=5.0)
-    assert (stats.below_target, stats.within_target, stats.above_target) == pytest.approx(
-        (0.2, 0.5, 0.3)
-    )
-
-
-def test_a_band_that_reaches_bare_metal_is_refused():
-    with pytest.raises(PaintError, match='tolerance_um 20 is not less than target_um 20: bare'):
-        film_statistics(np.ones(1), np.ones(1), 1.0, target_um=20.0, target_tolerance_um=20.0)
-
-
-@pytest.mark.parametrize(('target', 'cpk'), [(20.0, 1.0), (22.0, 4.0 / 6.0), (28.0, -2.0 / 6.0)])
-def test_cpk_is_the_way_to_the_nearer_limit_over_three_standard_deviations(target, cpk):
-    # Half the area at 18, half at 22 um: mean 20, standard deviation 2.
-    stats = film_statistics(
-        np.array([18.0, 22.0]), np.ones(2), 1.0, target_um=target, target_tolerance_um=6.0
-    )
-    assert stats.cpk == pytest.approx(cpk, rel=1e-12)
-
-
-def test_without_target_or_paint_figures_say_so():
     stats = film_statistics(np.zeros(4), np.full(4, 0.25), emitted_cm3=0.0)
     assert math.isnan(stats.within_target)
     assert math.isnan(stats.capture_fraction)
     assert stats.to_dict()['capture_fraction'] is None
     assert (stats.mean_um, stats.std_dev_um, stats.max_um, stats.coverage) == (0, 0, 0, 0)
+
+
+def test_cpk_is_the_way_to_the_nearer_limit_over_three_standard_deviations():
+    """Half the area at 18, half at 22 um: mean 20, standard deviation 2."""
+    half = np.array([18.0, 22.0]), np.ones(2), 1.0
+    for target, cpk in ((20.0, 1.0), (22.0, 4.0 / 6.0), (28.0, -2.0 / 6.0)):
+        stats = film_statistics(*half, target_um=target, target_tolerance_um=6.0)
+        assert stats.cpk == pytest.approx(cpk, rel=1e-12)
 
 
 def test_zones_share_the_area_and_add_up_to_the_whole():
@@ -95,27 +79,28 @@ def test_zones_share_the_area_and_add_up_to_the_whole():
     assert a.painted_volume_cm3 + b.painted_volume_cm3 == pytest.approx(film[:6] @ area[:6])
     assert (a.coverage, math.isnan(stats.cpk), math.isnan(b.cpk)) == (0.4 / 1.4, True, False)
     # With a target elsewhere, that area counts, too.
-    everywhere = film_statistics(
-        film, area, 1.0, target_um=50.0, target_tolerance_um=1.0, zones=zones
-    )
+    target = {'target_um': 50.0, 'target_tolerance_um': 1.0}
+    everywhere = film_statistics(film, area, 1.0, **target, zones=zones)
     assert everywhere.within_target == pytest.approx((0.3 + 0.4 + 5.0) / 5.9)
     assert [zone['name'] for zone in everywhere.to_dict()['zones']] == ['left', 'right']
     assert 'zones' not in film_statistics(film, area, 1.0).to_dict()
 
 
-# 180 cm3/min is 3 cm3/s, 360 is 6.
 ONE = Brush(number=1, planar=NARROW, flow_cm3_per_min=180.0, solids=0.5, density_g_per_cm3=1.2)
 TWO = Brush(number=2, planar=WIDE, flow_cm3_per_min=360.0, solids=0.5, density_g_per_cm3=1.1)
 
 
+# One second of brush 1 at flow 0.5, two of brush 2.
+MOTION = straight_pass(
+    np.arange(0.0, 4.0, 0.02), (-0.2, 0.0, 0.25), (0.2, 0.0, 0.25),
+    **switched(stamps_ns([0.5, 1.5, 3.5]), (0.5, 1), (1.0, 2), (0.0, 0)),
+)  # fmt: skip
+
+
 def painted(*brushes: Brush) -> tuple[FilmIntegrator, float, float]:
-    """One second of brush 1 at flow 0.5, two of brush 2: integrator, mean film, solids there."""
-    motion = replace(
-        straight_pass(np.arange(0.0, 4.0, 0.02), (-0.2, 0.0, 0.25), (0.2, 0.0, 0.25)),
-        **switched(stamps_ns([0.5, 1.5, 3.5]), (0.5, 1), (1.0, 2), (0.0, 0)),
-    )
+    """Integrator, mean film, solids on the plane."""
     points = lying_plane(1.5, 101)
-    film = scenes.painted(points, motion, DepositionModel(brushes=brushes), 'double')
+    film = scenes.painted(points, MOTION, DepositionModel(brushes=brushes), 'double')
     return film, float(film.film_um.mean()), float(points.area_m2 @ film.film_um)
 
 
@@ -148,11 +133,7 @@ def test_a_brush_that_says_less_leaves_only_that_unknown():
 
 
 def test_amounts_add_up_however_the_path_was_cut():
-    path, _ = spray_path(replace(
-        straight_pass(np.arange(0.0, 4.0, 0.02)),
-        **switched(stamps_ns([0.5, 1.5, 3.5]), (0.5, 1), (1.0, 2), (0.0, 0)),
-    ))  # fmt: skip
-    model = DepositionModel(brushes=[ONE, TWO])
+    path, model = spray_path(MOTION)[0], DepositionModel(brushes=[ONE, TWO])
     whole = PaintUsed.of(model, path)
     parts = [PaintUsed.of(model, path.select(slice(k, k + 37))) for k in range(0, len(path), 37)]
     total = sum(parts, PaintUsed())
@@ -164,7 +145,8 @@ def test_more_solids_than_are_sprayed_are_told():
     """K1 is 1.3 cm3/s; 120 cm3/min at half solids are 1."""
     thin = ONE.model_copy(update={'flow_cm3_per_min': 120.0})
     assert efficiency(thin) == pytest.approx(1.3)
-    (line,) = impossible_brushes(DepositionModel(brushes=[thin, TWO]))
+    (line,) = statistics.impossible_brushes(DepositionModel(brushes=[thin, TWO]))
     assert line.startswith('brush 1 would lay 1.30 times the solids that it sprays')
-    assert math.isnan(efficiency(Brush(number=2, planar=WIDE)))
-    assert impossible_brushes(DepositionModel(brushes=[Brush(number=2, planar=WIDE)])) == ()
+    silent = Brush(number=2, planar=WIDE)
+    assert math.isnan(efficiency(silent))
+    assert statistics.impossible_brushes(DepositionModel(brushes=[silent])) == ()

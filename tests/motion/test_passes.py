@@ -24,6 +24,14 @@ def resampled(corners_m, spacing_m):
     return np.stack([np.interp(at, along, corners_m[:, k]) for k in (0, 1)], axis=1), at
 
 
+def level(at_s, xy, noise_m=0.0, seed=3, **trigger):
+    """Poses 0.25 m above places (N, 2) at these times, the gun looking down."""
+    positions = np.column_stack([xy, np.full(len(xy), 0.25)])
+    positions += np.random.default_rng(seed).normal(0.0, noise_m, positions.shape)
+    quaternions = np.tile(scenes.LOOKING_DOWN, (len(xy), 1))
+    return Trajectory(scenes.stamps_ns(at_s), positions, quaternions, **trigger)
+
+
 def turn_points(kind, radius_m):
     """From one pass to the next, up by `rise`: points right of the pass's end, and the rise."""
     arc = np.linspace(0.0, np.pi, 181)[1:-1]
@@ -55,10 +63,7 @@ def raster(kind, radius_m, gun, noise_m=0.0, period_s=0.004):
         trigger = {'trigger_stamps_ns': stamps[change], 'trigger_flow': on[change].astype(float)}
     elif gun == 'on':
         trigger = {'trigger_stamps_ns': stamps[:1], 'trigger_flow': np.ones(1)}
-    positions = np.column_stack([xy, np.full(len(xy), 0.25)])
-    positions += np.random.default_rng(3).normal(0.0, noise_m, positions.shape)
-    quaternions = np.tile(scenes.LOOKING_DOWN, (len(xy), 1))
-    return Trajectory(stamps, positions, quaternions, **trigger)
+    return level(at_m / SPEED_M_PER_S, xy, noise_m, **trigger)
 
 
 def assert_passes_are_the_rows(path):
@@ -103,11 +108,8 @@ def arc_pass(radius_m, sweep_rad, followed, noise_m=2e-4):
     angle = np.concatenate([angle[:half], np.full(len(link), angle[half]), angle[half:]])
     positions += np.random.default_rng(4).normal(0.0, noise_m, positions.shape)
     tilt = Rotation.from_euler('y', angle if followed else 0.0 * angle)
-    return Trajectory(
-        scenes.stamps_ns(0.01 * np.arange(len(positions))),
-        positions,
-        (tilt * Rotation.from_quat(scenes.LOOKING_DOWN)).as_quat(),
-    )
+    quaternions = (tilt * Rotation.from_quat(scenes.LOOKING_DOWN)).as_quat()
+    return Trajectory(scenes.stamps_ns(0.01 * np.arange(len(angle))), positions, quaternions)
 
 
 @pytest.mark.parametrize(
@@ -124,30 +126,26 @@ def test_a_pass_along_a_crowned_part_is_one(radius_m, sweep_rad, followed):
         assert len(set(path.stroke[beyond])) == 1
 
 
-def test_a_gun_that_is_tilted_on_a_straight_pass_does_not_turn():
+def test_a_gun_that_is_tilted_on_a_straight_pass_or_trembles_at_rest_does_not_turn():
     x = np.arange(0.0, 1.2, 0.003)
+    straight = level(x / 0.3, np.column_stack([x, 0.0 * x]))
     tilt = Rotation.from_euler('y', 2.0 * (x / 1.2 - 0.5))
-    positions = np.column_stack([x, 0.0 * x, 0.25 + 0.0 * x])
-    quaternions = (tilt * Rotation.from_quat(scenes.LOOKING_DOWN)).as_quat()
-    path, _ = spray_path(Trajectory(scenes.stamps_ns(x / 0.3), positions, quaternions))
+    quaternions = (tilt * Rotation.from_quat(straight.quaternions_xyzw)).as_quat()
+    path, _ = spray_path(replace(straight, quaternions_xyzw=quaternions))
     assert path.stroke.max() == 0
     assert path.spray_pass.max() == 0
+    times = np.arange(0.0, 3.0, 0.01)
+    still = level(times, np.zeros((len(times), 2)), noise_m=2e-4, seed=5)
+    assert spray_path(still)[0].stroke[-1] == 0
 
 
 @pytest.mark.parametrize(('shift_m', 'passes'), [(0.0, 1), (0.2, 2)])
 def test_a_gun_that_opens_again_on_another_track_begins_a_pass(shift_m, passes):
     """Off at 0.5 m, up by the shift at 45 degrees at most, on again 0.3 m farther."""
     xy, at_m = resampled([(0.0, 0.0), (0.5, 0.0), (0.8, shift_m), (1.5, shift_m)], 0.003)
-    stamps = scenes.stamps_ns(at_m / 0.3)
-    on_m = [0.0, 0.5, 0.5 + np.hypot(0.3, shift_m)]
-    trajectory = Trajectory(
-        stamps,
-        np.column_stack([xy, np.full(len(xy), 0.25)]),
-        np.tile(scenes.LOOKING_DOWN, (len(xy), 1)),
-        trigger_stamps_ns=scenes.stamps_ns(np.array(on_m) / 0.3),
-        trigger_flow=np.array([1.0, 0.0, 1.0]),
-    )
-    path, _ = spray_path(trajectory)
+    changes = scenes.stamps_ns(np.array([0.0, 0.5, 0.5 + np.hypot(0.3, shift_m)]) / 0.3)
+    trigger = {'trigger_stamps_ns': changes, 'trigger_flow': np.array([1.0, 0.0, 1.0])}
+    path, _ = spray_path(level(at_m / 0.3, xy, **trigger))
     assert path.stroke.max() == 0
     assert path.spray_pass.max() == passes - 1
 
@@ -159,10 +157,7 @@ def test_a_turn_is_placed_where_the_path_turns(angle_deg, noise_m):
     for run_m in (0.5, 0.504, 0.507, 0.511):
         end = (run_m + 0.5 * np.cos(angle), 0.5 * np.sin(angle))
         xy, at_m = resampled([(0.0, 0.0), (run_m, 0.0), end], 0.002)
-        positions = np.column_stack([xy, np.full(len(xy), 0.25)])
-        positions += np.random.default_rng(6).normal(0.0, noise_m, positions.shape)
-        quaternions = np.tile(scenes.LOOKING_DOWN, (len(xy), 1))
-        path, _ = spray_path(Trajectory(scenes.stamps_ns(at_m / 0.5), positions, quaternions))
+        path, _ = spray_path(level(at_m / 0.5, xy, noise_m, seed=6))
         assert path.stroke.max() == 1
         nearest_m = np.minimum(path.from_turn_m, path.to_turn_m)
         at_s = (path.stamp_ns - scenes.START_NS) * 1e-9
@@ -182,9 +177,7 @@ def route(corners, **trigger):
     along = np.concatenate([[0.0], np.cumsum(legs)])
     at = np.append(np.arange(0.0, along[-1], 0.01 * SPEED), along[-1])
     xy = np.stack([np.interp(at, along, corners[:, axis]) for axis in range(2)], axis=1)
-    positions = np.hstack([xy, np.full((len(at), 1), 0.25)])
-    quaternions = np.tile(scenes.LOOKING_DOWN, (len(at), 1))
-    return Trajectory(scenes.stamps_ns(at / SPEED), positions, quaternions, **trigger)
+    return level(at / SPEED, xy, **trigger)
 
 
 # Three passes of 1.2 m, 0.3 m apart, with links between them.
@@ -193,8 +186,7 @@ ON_OFF_S = [1.0, 3.0, 6.0, 8.0, 11.0, 13.0]  # 0.6 m in the middle of each pass
 
 
 def sprayed_serpentine():
-    on_off = np.tile([1.0, 0.0], 3)
-    stamps = scenes.stamps_ns(ON_OFF_S)
+    stamps, on_off = scenes.stamps_ns(ON_OFF_S), np.tile([1.0, 0.0], 3)
     return route(SERPENTINE, trigger_stamps_ns=stamps, trigger_flow=on_off)
 
 
@@ -225,25 +217,13 @@ def test_distances_to_turns_add_up_to_the_leg():
     for stroke, (begin_m, end_m) in enumerate([(0, 1.2), (1.2, 1.5), (1.5, 2.7), (2.7, 3.0)]):
         # The new stroke shows some centimetres behind the turn; up to there it is the old one.
         rows = (path.stroke == stroke) & (travelled_m < end_m)
-        assert np.all(
-            path.stroke[(travelled_m > begin_m + 0.04) & (travelled_m < end_m)] == stroke
-        )
+        late = (travelled_m > begin_m + 0.04) & (travelled_m < end_m)
+        assert np.all(path.stroke[late] == stroke)
         to_m, from_m = path.to_turn_m[rows], path.from_turn_m[rows]
         assert np.allclose(to_m + from_m, end_m - begin_m, atol=0.001)
         assert np.ptp(to_m + from_m) < 1e-9
-    # 0.3 m into the first pass.
     row = np.argmin(np.abs(path.position_m[path.stroke == 0, 0] - 0.3))
     assert path.from_turn_m[row] == pytest.approx(0.3, abs=0.005)
-
-
-def test_trembling_at_rest_is_no_turn():
-    rng = np.random.default_rng(5)
-    times = np.arange(0.0, 3.0, 0.01)
-    still = rng.normal(0.0, 2e-4, (len(times), 3)) + np.array([0.0, 0.0, 0.25])
-    trajectory = Trajectory(
-        scenes.stamps_ns(times), still, np.tile(scenes.LOOKING_DOWN, (len(times), 1))
-    )
-    assert spray_path(trajectory)[0].stroke[-1] == 0
 
 
 def test_strokes_do_not_depend_on_where_the_part_stands():
@@ -280,13 +260,9 @@ def test_a_gap_while_the_gun_sprays_is_named_with_its_place_and_paint():
     assert line.startswith('a gap in the poses while the gun sprayed, 2.40 s in all')
     assert '2.40 s from (-0.12, 0.00, 0.25) m to (0.17, 0.00, 0.25) m: taken as gun off' in line
     assert '31.7 % more paint was sprayed than is computed' in line
-    assert lines_of(rows(seen), max_pose_gap_s=2.5) == []
-    closed = {
-        'trigger_stamps_ns': scenes.stamps_ns([0.0, 3.9]),
-        'trigger_flow': np.array([1.0, 0]),
-    }
-    assert lines_of(rows(seen, **closed)) == []
-    assert lines_of(WHOLE) == []
+    changes, flow = scenes.stamps_ns([0.0, 3.9]), np.array([1.0, 0])
+    closed = rows(seen, trigger_stamps_ns=changes, trigger_flow=flow)
+    assert lines_of(closed) == lines_of(rows(seen), max_pose_gap_s=2.5) == lines_of(WHOLE) == []
 
 
 def test_a_log_that_is_in_the_file_twice_is_told_from_another_run():
@@ -300,14 +276,11 @@ def test_a_log_that_is_in_the_file_twice_is_told_from_another_run():
     assert 'another run follows in the file' in line
 
 
-def test_poses_dropped_for_rounded_stamps_are_warned_of():
+def test_stamps_that_are_rounded_or_milliseconds_taken_for_seconds_are_told():
     rounded = replace(WHOLE, stamps_ns=WHOLE.stamps_ns // 10**8 * 10**8)
     (line,) = checked_path(rounded, 0.25)[2]
     assert line.startswith('400 of 500 poses dropped, for they repeat the stamp before them')
     assert checked_path(WHOLE, 0.25)[2] == ()
-
-
-def test_milliseconds_that_are_taken_for_seconds_are_suggested():
     slow = replace(WHOLE, stamps_ns=1000 * (WHOLE.stamps_ns - WHOLE.stamps_ns[0]))
     with pytest.raises(RecordingError, match=r'they are 20 s apart: if these are milliseconds'):
         checked_path(slow, 0.25)

@@ -21,7 +21,7 @@ def random_poses(count: int) -> tuple[np.ndarray, np.ndarray]:
     return rng.normal(size=(count, 3)), Rotation.random(count, random_state=4).as_quat()
 
 
-def test_transforms_agree_with_scipy_and_keep_the_norm_of_quaternions():
+def test_transforms_agree_with_scipy_one_by_one_and_chained():
     positions, quaternions = random_poses(20)
     quaternions *= 1.003  # screening is to see what was recorded
     turn = Rotation.random(random_state=9)
@@ -31,10 +31,14 @@ def test_transforms_agree_with_scipy_and_keep_the_norm_of_quaternions():
     expected = (turn * Rotation.from_quat(quaternions)).as_matrix()
     assert np.allclose(Rotation.from_quat(turned).as_matrix(), expected, atol=1e-14)
     assert np.allclose(np.linalg.norm(turned, axis=1), 1.003, atol=1e-14)
-
-
-def test_one_pose_comes_out_as_among_others():
-    """So the film of a node, which takes poses one by one, is that of the offline command."""
+    a = Rigid.of([1.0, 0.0, -2.0, *Rotation.random(random_state=1).as_quat()])
+    b = Rigid.of([0.2, 0.5, 0.0, *Rotation.random(random_state=2).as_quat()])
+    poses = random_poses(5)
+    assert np.allclose((a @ a.inverse()).values, [0, 0, 0, 0, 0, 0, 1], atol=1e-15)
+    chained, stepwise = (a @ b).applied(*poses), a.applied(*b.applied(*poses))
+    assert np.allclose(chained[0], stepwise[0], atol=1e-14)
+    assert np.allclose(chained[1], stepwise[1], atol=1e-14)
+    # So the film of a node, which takes poses one by one, is that of the offline command.
     positions, quaternions = random_poses(50)
     place = Rigid.of([0.3, -2.0, 1.1, *Rotation.random(random_state=9).as_quat()]).inverse()
     together = place.applied(positions, quaternions)
@@ -43,31 +47,13 @@ def test_one_pose_comes_out_as_among_others():
     assert np.array_equal(together[1], [quaternion for _, quaternion in alone])
 
 
-def test_the_inverse_undoes_and_products_chain():
-    a = Rigid.of([1.0, 0.0, -2.0, *Rotation.random(random_state=1).as_quat()])
-    b = Rigid.of([0.2, 0.5, 0.0, *Rotation.random(random_state=2).as_quat()])
-    poses = random_poses(5)
-    assert np.allclose((a @ a.inverse()).values, [0, 0, 0, 0, 0, 0, 1], atol=1e-15)
-    chained, stepwise = (a @ b).applied(*poses), a.applied(*b.applied(*poses))
-    assert np.allclose(chained[0], stepwise[0], atol=1e-14)
-    assert np.allclose(chained[1], stepwise[1], atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ('values', 'good'),
-    [
-        ([0, 0, 0, 0, 0, 0, 1.009], True), ([0, 0, 0, 0, 0, 0, 1.02], False),
-        ([0, 0, 0, 0, 0, 1], False), ([np.nan, 0, 0, 0, 0, 0, 1], False),
-    ],
-)  # fmt: skip
-def test_seven_numbers_with_a_unit_quaternion_are_a_pose(values, good):
-    assert is_pose(values) is good
-
-
-def test_frames_are_the_same_with_or_without_a_slash():
-    assert is_frame('/part', 'part')
-    assert is_frame('part', '/part')
-    assert is_frame('', 'part')
+def test_seven_numbers_are_a_pose_and_frames_the_same_with_or_without_a_slash():
+    place = [0.0] * 6
+    assert is_pose([*place, 1.009])
+    for bad in ([*place, 1.02], [0, 0, 0, 0, 0, 1], [np.nan, *place[1:], 1.0]):
+        assert not is_pose(bad)
+    for one, other in (('/part', 'part'), ('part', '/part'), ('', 'part')):
+        assert is_frame(one, other)
     assert not is_frame('base_link', 'part')
 
 
@@ -102,13 +88,18 @@ def test_exact_points_give_the_pose(names):
     assert place.warnings == ()
 
 
-def test_noise_of_a_probe_shows_in_the_residuals():
+def test_noise_of_a_probe_shows_in_the_residuals_and_points_that_fix_no_pose_are_refused():
     """0.3 mm on each axis: about 0.3 mm times the root of 3, less what the fit takes."""
     place = locate(touched(0.3e-3), POINTS)
     assert apart(place.pose)[0] < 1e-3
     assert 0.2e-3 < place.rms_m < 0.6e-3
     assert place.rms_m**2 == pytest.approx(np.mean(np.square([*place.residuals_m.values()])))
     assert place.warnings == ()
+    with pytest.raises(RecordingError, match='2 points in common'):
+        locate({'P1': POINTS['P1'], 'P2': POINTS['P2'], 'Q': POINTS['P3']}, POINTS)
+    line = {f'L{k}': np.array([0.3 * k, 0.1 * k, 0.001 * (k == 1)]) for k in range(4)}
+    with pytest.raises(RecordingError, match='lie on a line'):
+        locate(line, line)
 
 
 @pytest.mark.parametrize(
@@ -126,14 +117,6 @@ def test_points_that_do_not_fit_are_warned_of(spoilt):
     (warning,) = place.warnings
     worst = max(place.residuals_m, key=place.residuals_m.get)
     assert warning.startswith(f'the points do not fit, {worst} is off by')
-
-
-def test_points_that_fix_no_pose_are_refused():
-    with pytest.raises(RecordingError, match='2 points in common'):
-        locate({'P1': POINTS['P1'], 'P2': POINTS['P2'], 'Q': POINTS['P3']}, POINTS)
-    line = {f'L{k}': np.array([0.3 * k, 0.1 * k, 0.001 * (k == 1)]) for k in range(4)}
-    with pytest.raises(RecordingError, match='lie on a line'):
-        locate(line, line)
 
 
 STEP_NS = 100_000_000
@@ -189,33 +172,22 @@ def test_nothing_is_guessed_across_a_gap(tree):
         tree.lookup('world', 'part', after + 1)
 
 
-def test_where_the_user_places_a_part_goes_before_transforms(tree):
+def test_where_the_user_places_a_part_goes_before_transforms_and_each_parent_at_its_time(tree):
     tree.place('part', 'world', CAMERA)
     assert np.allclose(tree.lookup('camera', 'part').values, [0, 0, 0, 0, 0, 0, 1])
     tree.place('part', 'world', [])
     assert tree.moving_between('camera', 'part') == {'part'}
-
-
-def test_a_live_stream_that_begins_again_forgets_what_was_before():
-    tree = FrameTree(live=True)
-    stamps = [50 * STEP_NS, 51 * STEP_NS, 0, STEP_NS, 2 * STEP_NS]
-    restarted = [tree.add('part', 'world', stamp, on_conveyor(stamp)) for stamp in stamps]
-    assert restarted == [False, False, False, True, False]
-    assert tree.stamps_ns('part') == stamps[2:]
-
-
-def test_one_late_transform_forgets_nothing():
-    tree = FrameTree(live=True)
-    stamps = [50 * STEP_NS, 51 * STEP_NS, 30 * STEP_NS, 52 * STEP_NS, 31 * STEP_NS]
-    assert not any(tree.add('part', 'world', stamp, on_conveyor(stamp)) for stamp in stamps)
-    assert tree.stamps_ns('part') == sorted(stamps)
-
-
-def test_a_part_that_is_handed_over_has_each_parent_at_its_time(tree):
     tree.add('part', 'gripper', 12 * STEP_NS, CAMERA)
-    assert tree.lookup('part', 'world', 11 * STEP_NS).values == pytest.approx(
-        on_conveyor(10 * STEP_NS)
-    )
+    before = tree.lookup('part', 'world', 11 * STEP_NS)
+    assert before.values == pytest.approx(on_conveyor(10 * STEP_NS))
     tree.fix('gripper', 'world', CAMERA)
     handed = Rigid.of(CAMERA) @ Rigid.of(CAMERA)
     assert tree.lookup('part', 'world', 12 * STEP_NS).values == pytest.approx(handed.values)
+
+
+def test_a_live_stream_that_begins_again_forgets_what_was_before_one_late_transform_nothing():
+    for steps, begins in (((50, 51, 0, 1, 2), 3), ((50, 51, 30, 52, 31), None)):
+        tree, stamps = FrameTree(live=True), [STEP_NS * step for step in steps]
+        restarted = [tree.add('part', 'world', stamp, on_conveyor(stamp)) for stamp in stamps]
+        assert restarted == [row == begins for row in range(5)]
+        assert tree.stamps_ns('part') == (stamps[2:] if begins else sorted(stamps))

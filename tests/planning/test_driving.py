@@ -112,9 +112,8 @@ def test_a_slow_joint_slows_its_passes_each_as_a_whole(planned, cell, on_robot):
 
 
 def test_an_improvement_is_that_which_the_robot_drives(planned, cell):
-    better = pd.improve(
-        planned.surface, planned.trajectory, ROUND, robot=replace(cell, acceleration=0.3)
-    )
+    slow = replace(cell, acceleration=0.3)
+    better = pd.improve(planned.surface, planned.trajectory, ROUND, robot=slow)
     assert better.drive.limits
     assert 'bound by the joints' in better.warnings[-1]
     clock = Programme.of(better.trajectory)
@@ -175,17 +174,14 @@ def test_a_configuration_once_chosen_is_kept(planned, cell):
         cell.drive(planned.trajectory, False, other)
 
 
-@pytest.mark.parametrize(
-    ('place_m', 'words'),
-    [((5.0, 0.0), 'does not reach the first pose'), ((1.2, 0.2), 'follows the motion to')],
-)
-def test_what_cannot_be_driven_says_where(planned, cell, place_m, words):
-    part = Rigid.of([*place_m, *PART_POSE[2:]])
-    with pytest.raises(PlanError, match=words):
-        replace(cell, part=part).drive(planned.trajectory, free_roll=False)
-
-
-def test_a_robot_without_speeds_is_refused(tmp_path):
+def test_what_cannot_be_driven_says_where_and_a_robot_without_speeds_is_refused(
+    planned, cell, tmp_path
+):
+    for x_m, y_m, words in ((5.0, 0.0, 'does not reach the first pose'),
+                            (1.2, 0.2, 'follows the motion to')):  # fmt: skip
+        part = Rigid.of([x_m, y_m, *PART_POSE[2:]])
+        with pytest.raises(PlanError, match=words):
+            replace(cell, part=part).drive(planned.trajectory, free_roll=False)
     unknown = tmp_path / 'unknown.urdf'
     unknown.write_text(robot_arm.URDF.read_text().replace(' velocity="1"', '', 1))
     with pytest.raises(PlanError, match='no greatest speed of shoulder_pan'):
@@ -218,9 +214,8 @@ def test_the_place_to_choose_has_good_neighbours(cell):
 
 
 def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
-    trimesh.Trimesh(planned.surface.vertices_m, planned.surface.faces, process=False).export(
-        tmp_path / 'flat.stl'
-    )
+    flat = planned.surface
+    trimesh.Trimesh(flat.vertices_m, flat.faces, process=False).export(tmp_path / 'flat.stl')
     model = tmp_path / 'round.yaml'
     pd.write_model(model, ROUND)
     part = '--mesh', tmp_path / 'flat.stl', '--max-edge-length-m', 0.05

@@ -41,9 +41,8 @@ def panel():
 @pytest.fixture(scope='module')
 def even(panel):
     """Level passes at one speed, even in the model without effects."""
-    return plan(
-        panel, NARROW, PlanRequest(speed_m_per_s=0.3, overspray_m=0.2, index_m=0.15), 'part'
-    )
+    request = PlanRequest(speed_m_per_s=0.3, overspray_m=0.2, index_m=0.15)
+    return plan(panel, NARROW, request, 'part')
 
 
 @pytest.fixture(scope='module')
@@ -77,7 +76,6 @@ def test_speed_takes_away_what_an_effect_lays_too_much(levelled):
     slope, level = np.polyfit(places[inside, 0], speed[inside], 1)
     # 1 + h rises by 0.5 a metre.
     assert slope / level == pytest.approx(0.5, rel=0.2)
-    # The mean stays, and the path too.
     assert levelled.after.mean_um == pytest.approx(levelled.before.mean_um, rel=3e-3)
     original, new = levelled.original.positions_m, levelled.trajectory.positions_m
     assert cKDTree(original).query(new)[0].max() < 0.004
@@ -93,7 +91,6 @@ def test_a_target_is_met_and_paint_used_is_flow_times_time(panel, even):
     assert better.after.paint_cm3 == pytest.approx(1.0 * path.spraying_time_s, rel=1e-9)
     opened = better.trajectory.trigger_flow[better.trajectory.trigger_flow > 0.0]
     assert np.all((opened >= 0.8 - 1e-6) & (opened <= 1.2 + 1e-6))
-    # The same flows are in the robot program.
     in_program = np.unique(np.round([m.flow for m in better.moves if m.spraying], 4))
     np.testing.assert_allclose(in_program, np.unique(np.round(opened, 4)))
     assert better.program_difference < 1e-3
@@ -102,9 +99,8 @@ def test_a_target_is_met_and_paint_used_is_flow_times_time(panel, even):
 
 @pytest.mark.slow
 def test_paint_that_is_dear_is_kept_off_the_air(panel, even):
-    free, dear = (
-        pd.improve(panel, even.trajectory, NARROW, paint_weight=weight) for weight in (0.0, 0.02)
-    )
+    motion = even.trajectory
+    free, dear = (pd.improve(panel, motion, NARROW, paint_weight=w) for w in (0.0, 0.02))
     assert dear.after.paint_cm3 < 0.93 * free.after.paint_cm3
     assert dear.after.mean_um == pytest.approx(free.after.mean_um, rel=0.01)
     assert any(change.opens_earlier_m < -0.01 for change in dear.changes)
@@ -130,10 +126,8 @@ def test_the_written_motion_keeps_the_limits_and_names_those_that_cost(panel, ev
     assert speed.min() > 0.29 * (1.0 - 1e-4)
     assert speed.max() < 0.32 * (1.0 + 1e-4)
     assert np.abs(change).max() < 0.1 * 1.02
-    lengths = [
-        np.linalg.norm(b.position_m - a.position_m) for a, b in pairwise(held.moves) if b.spraying
-    ]
-    assert min(lengths) > 0.02 * (1.0 - 1e-3)
+    legs_m = [b.position_m - a.position_m for a, b in pairwise(held.moves) if b.spraying]
+    assert np.linalg.norm(legs_m, axis=1).min() > 0.02 * (1.0 - 1e-3)
     assert levelled.after.sigma_n < held.after.sigma_n < held.before.sigma_n
     assert 'speed' in ' '.join(held.retiming.binding_limits)
     assert any(line.startswith('limited by the') for line in held.limit_sentences)
@@ -151,9 +145,8 @@ def test_a_mean_that_the_limits_do_not_allow_is_warned_of(panel, even):
 
 @pytest.mark.slow
 def test_no_weights_reach_below_the_most_even_film_of_the_path(panel, even, levelled):
-    free = pd.improve(
-        panel, even.trajectory, SKEWED, paint_weight=0.0, smoothness=0.0, speed_max_m_per_s=3.0
-    )
+    wanted = {'paint_weight': 0.0, 'smoothness': 0.0, 'speed_max_m_per_s': 3.0}
+    free = pd.improve(panel, even.trajectory, SKEWED, **wanted)
     assert free.after.sigma_n < 1.001 * levelled.after.sigma_n
     assert levelled.sigma_n_of_path < 1.02 * free.after.sigma_n
     assert levelled.sigma_n_of_path <= levelled.after.sigma_n
@@ -225,10 +218,8 @@ def test_a_short_pass_is_a_change_and_a_gun_that_looks_along_the_part_is_refused
 
     def over(quaternion, y_m):
         places = [np.array([x, y_m, 0.0]) for x in (-0.1, -0.02, 0.02, 0.1)]
-        return timed(
-            [Move(at, quaternion, 0.1, spraying=k == 2) for k, at in enumerate(places)],
-            gun_known=True,
-        )
+        moves = [Move(at, quaternion, 0.1, spraying=k == 2) for k, at in enumerate(places)]
+        return timed(moves, gun_known=True)
 
     found = pd.improve(small, over(LOOKING_ALONG_Y, -0.25), NARROW, trigger_shift_m=0.0)
     assert [change.number for change in found.changes] == [1]
@@ -242,9 +233,8 @@ def test_a_short_pass_is_a_change_and_a_gun_that_looks_along_the_part_is_refused
 def test_the_gun_is_closed_in_turns_beside_the_part(panel):
     """Four moves at one speed with the gun open throughout: two passes, and the turns between."""
     corners = [(-0.5, 0.1), (0.5, 0.1), (0.5, -0.1), (-0.5, -0.1), (-0.5, -0.4)]
-    moves = [
-        Move(np.array([x, -0.25, z]), LOOKING_ALONG_Y, 0.3, spraying=True) for x, z in corners
-    ]
+    places = (np.array([x, -0.25, z]) for x, z in corners)
+    moves = [Move(at, LOOKING_ALONG_Y, 0.3, spraying=True) for at in places]
     moves.insert(1, replace(moves[0], wait_s=0.5))
     through = timed(moves, gun_known=True)
     closed, kept = (pd.improve(panel, through, NARROW, spray_turns=k) for k in (False, True))
@@ -272,15 +262,11 @@ def test_gaps_between_poses_close_the_gun_and_flows_are_averaged():
     )  # fmt: skip
     late = always.stamps_ns.copy()
     late[len(late) // 2 :] += 400_000_000
-    assert [len(Programme.of(m).openings) for m in (always, replace(always, stamps_ns=late))] == [
-        1, 2,
-    ]  # fmt: skip
+    both = always, replace(always, stamps_ns=late)
+    assert [len(Programme.of(motion).openings) for motion in both] == [1, 2]
     flows = switched(stamps_ns([0.5, 1.5, 2.0]), (1.0, 1), (0.4, 1), (0, 0))
     (opening,) = Programme.of(replace(SWITCHED, **flows)).openings
     assert opening.flow == pytest.approx(0.8)
-
-
-# --- films that are to be on the targets of their zones
 
 
 def zone(name, target_um, tolerance_um, low_x=-1.0, high_x=1.0):
@@ -303,10 +289,8 @@ def test_each_zone_comes_to_its_target(panel, even):
     for name in ('left', 'right'):
         assert after[name].within_target > before[name].within_target + 0.2
     assert found.after.sigma_n < 0.4 * found.before.sigma_n
-    written = found.to_dict()['zones']
-    assert [(one['name'], one['after']['mean_um']) for one in written] == [
-        ('left', left.mean_um), ('right', right.mean_um),
-    ]  # fmt: skip
+    written = {one['name']: one['after']['mean_um'] for one in found.to_dict()['zones']}
+    assert written == {'left': left.mean_um, 'right': right.mean_um}
     x = panel.vertices_m[:, 0]
     assert not found.wanted.region[np.abs(x) < 0.059].any()
 

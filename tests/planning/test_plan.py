@@ -7,7 +7,6 @@ import pytest
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.planning.placement import place_passes
@@ -20,7 +19,7 @@ from surfaces import sheet
 
 pytestmark = pytest.mark.slow
 
-NARROW = DepositionModel(
+NARROW = pd.DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.1, r_m=0.1, sigma1_m=0.042, sigma2_m=0.07)
 )
 
@@ -78,9 +77,8 @@ def test_on_a_wide_plane_the_plan_is_as_even_as_the_recommendation():
     surface = sheet(lambda x, z: 0.0 * x, half_m=0.6)
     flat = plan(surface, NARROW, PlanRequest(speed_m_per_s=0.2, overspray_m=0.5))
     assert flat.sigma_n < flat.plane.sigma_n + 0.015
-    assert flat.statistics.mean_um == pytest.approx(
-        NARROW.planar.K1_cm3_per_s / (0.2 * flat.placement.index_m), rel=0.03
-    )
+    mean_um = NARROW.planar.K1_cm3_per_s / (0.2 * flat.placement.index_m)
+    assert flat.statistics.mean_um == pytest.approx(mean_um, rel=0.03)
 
 
 def test_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it_or_run_downward(bowed, planned):
@@ -98,10 +96,7 @@ def test_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it_or_run_downward
     [
         ({'speed_m_per_s': None}, 'neither speed_m_per_s nor target_um'),
         ({'tolerance': 0.05, 'index_m': 0.3}, 'on this part within 5 %; the closest is'),
-        (
-            {'tolerance': 0.1, 'index_m': 0.2, 'optimise': True},
-            r'within 10 %; the closest is .* at 0\.200 m',
-        ),
+        ({'tolerance': 0.1, 'index_m': 0.2, 'optimise': True}, r'closest is .* at 0\.200 m'),
         ({'index_m': 0.2, 'index_min_m': 0.25}, 'index_m is 0.2, beyond index_min_m, 0.25'),
         ({'target_um': 2e4, 'speed_m_per_s': None}, 'give another target or index'),
         ({'overspray_m': -0.1}, 'overspray_m is -0.1'),

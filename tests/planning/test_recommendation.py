@@ -40,7 +40,6 @@ def test_every_local_minimum_is_found_and_the_deepest_recommended():
         assert minimum.sigma_n == pytest.approx(sigma_n(SYMMETRIC, minimum.index_m), rel=1e-9)
         for aside in (-1e-4, 1e-4):
             assert minimum.sigma_n <= sigma_n(SYMMETRIC, minimum.index_m + aside)
-    # Without a tolerance the deepest is recommended.
     assert answer.sigma_n == min(m.sigma_n for m in answer.minima)
     assert answer.index_drift_m is None
 
@@ -68,24 +67,26 @@ def test_the_tolerance_is_named_where_the_curve_is_away_from_it(range_m, side):
     assert label.get_ha() == side
 
 
-def test_drift_limits_are_where_the_tolerance_breaks():
+def test_drift_limits_are_where_the_tolerance_breaks_and_with_effects_not_known():
     answer = recommended(tolerance=0.05, index_min_m=0.4)
     assert answer.index_drift_m in answer.windows_m
     for change in answer.standoff_drift_m:
         there = sigma_n(SYMMETRIC, answer.index_m, standoff_m=0.25 + change)
         assert there == pytest.approx(0.05, abs=1e-5)
     assert answer.standoff_drift_m[0] < 0.0 < answer.standoff_drift_m[1]
+    answer = recommended(SYMMETRIC.with_effect(EFFECTS['overspray_fog']()), tolerance=0.05)
+    assert any('overspray_fog' in note for note in answer.notes)
+    assert answer.standoff_drift_m is None
 
 
 def test_passes_cover_the_width_to_its_edges():
     width = 1.5
     answer = recommended(tolerance=0.05, width_m=width, target_um=20.0)
     assert any('target of 20 µm would need' in note for note in answer.notes)
+    across_m, one_pass = np.linspace(-0.5, 0.5, 201) * width, answer.curve.parallel.first
     film, fewer = (
         sum(
-            answer.curve.parallel.first.thickness_um(
-                np.linspace(-0.5, 0.5, 201) * width - (k - 0.5 * (count - 1)) * answer.index_m
-            )
+            one_pass.thickness_um(across_m - (k - 0.5 * (count - 1)) * answer.index_m)
             for k in range(count)
         )
         for count in (answer.passes, answer.passes - 1)
@@ -117,9 +118,7 @@ def test_a_simulated_serpentine_is_as_even_as_said(turns):
 
 
 def test_gun_that_turns_makes_an_asymmetric_pattern_less_even():
-    kept, turned = (
-        recommended(LOPSIDED, tolerance=0.2, gun_turns=turns) for turns in (False, True)
-    )
+    kept, turned = (recommended(LOPSIDED, tolerance=0.2, gun_turns=k) for k in (False, True))
     assert turned.sigma_n > 1.2 * kept.sigma_n
     assert 'keeps its orientation' in kept.request.assumption
     assert 'turns' in turned.request.assumption
@@ -140,23 +139,18 @@ def test_default_range_follows_the_width_of_the_pattern(scale):
     assert recommended().index_range_m == (0.2, 0.8)
 
 
-@pytest.mark.parametrize(
-    'what',
-    [
-        {'index_min_m': 0.35, 'index_max_m': 0.45},
-        {'index_min_m': 0.45, 'index_max_m': 0.55},
-        {'index_min_m': 0.29, 'index_max_m': 0.5, 'tolerance': 0.06},
-    ],
-)
-def test_without_a_minimum_the_more_even_end_is_recommended(what):
-    answer = recommended(**what)
+ENDS = [(0.35, 0.45, {}), (0.45, 0.55, {}), (0.29, 0.5, {'tolerance': 0.06})]
+
+
+@pytest.mark.parametrize(('low', 'high', 'what'), ENDS)
+def test_without_a_minimum_the_more_even_end_is_recommended(low, high, what):
+    answer = recommended(index_min_m=low, index_max_m=high, **what)
     ends = answer.windows_m[0] if 'tolerance' in what else answer.index_range_m
     assert answer.index_m in ends
     assert answer.sigma_n == pytest.approx(min(sigma_n(SYMMETRIC, end) for end in ends))
     side = 'smaller' if answer.index_m == ends[0] else 'greater'
-    assert any(
-        f'no minimum of sigma_n here; it is more even at a {side}' in note for note in answer.notes
-    )
+    told = f'no minimum of sigma_n here; it is more even at a {side}'
+    assert any(told in note for note in answer.notes)
 
 
 def test_the_speed_for_a_target_keeps_its_limits():
@@ -170,12 +164,6 @@ def test_the_speed_for_a_target_keeps_its_limits():
     assert held.mean_um == pytest.approx(20.0)
     assert any('other speeds than are allowed' in note for note in held.notes)
     assert not any('other speeds than are allowed' in note for note in free.notes)
-
-
-def test_what_is_not_known_with_effects_is_left_out_and_named():
-    answer = recommended(SYMMETRIC.with_effect(EFFECTS['overspray_fog']()), tolerance=0.05)
-    assert any('overspray_fog' in note for note in answer.notes)
-    assert answer.standoff_drift_m is None
 
 
 @pytest.mark.parametrize(

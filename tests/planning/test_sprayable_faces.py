@@ -13,23 +13,17 @@ def outward(face) -> np.ndarray:
     return mean / np.linalg.norm(mean)
 
 
-def test_a_plane_is_one_face():
+def test_a_plane_is_one_face_a_hood_two_and_a_bumper_three():
     (face,) = sprayable_faces(panel())
     assert face.surface.area_m2 == pytest.approx(panel().area_m2)
     assert np.isinf(face.seam_distance_m).all()
     assert face.without_margin(0.1) is face
-
-
-def test_a_hood_is_its_top_and_its_flange():
     top, flange = sprayable_faces(hood())
     assert outward(top)[2] > 0.99
     assert outward(flange)[1] > 0.95
     assert top.surface.area_m2 + flange.surface.area_m2 == pytest.approx(hood().area_m2)
     assert flange.surface.area_m2 == pytest.approx(1.0 * (0.18 + 0.04), rel=0.15)
-
-
-def test_a_bumper_is_its_front_and_two_wings():
-    """The wings look the same way where it is bent into a U; they do not hang together."""
+    # The wings look the same way where it is bent into a U; they do not hang together.
     front, *wings = sprayable_faces(bumper())
     assert outward(front)[1] == pytest.approx(-1.0, abs=1e-3)
     assert sorted(round(outward(wing)[0], 1) for wing in wings) == [-1.0, 1.0]

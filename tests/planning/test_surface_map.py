@@ -10,16 +10,9 @@ import paint_deposition as pd
 from booth import panel, panel_with_screen, serpentine
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.part.surface import Surface
-from paint_deposition.planning.passes import (
-    PassStyle,
-    plan_pass,
-    plan_passes,
-    planned_moves,
-    trajectory_of,
-)
+from paint_deposition.planning import passes as gun_passes
+from paint_deposition.planning.passes import PassStyle, plan_pass, plan_passes, trajectory_of
 from paint_deposition.planning.planned_film import contacts
-from paint_deposition.planning.requests import GunEnvelope
 from paint_deposition.planning.sides import SurfaceMap, pass_axes
 from surfaces import sheet
 
@@ -48,10 +41,8 @@ def test_what_is_finer_than_the_radius_is_smoothed_away_and_what_is_wider_kept()
     ripple = sheet(lambda x, z: 0.004 * np.sin(2.0 * np.pi * x / 0.06), count=121)
     bow = sheet(lambda x, z: 0.5 * x**2)
     u = np.linspace(-0.35, 0.35, 200)
-    flat = SurfaceMap(ripple, pass_axes(ripple, outward=(0.0, -1.0, 0.0)), 0.15).height_m(
-        u, 0.0 * u
-    )
-    assert np.ptp(flat) < 0.0015
+    smoothed = SurfaceMap(ripple, pass_axes(ripple, outward=(0.0, -1.0, 0.0)), 0.15)
+    assert np.ptp(smoothed.height_m(u, 0.0 * u)) < 0.0015
     surface_map = SurfaceMap(bow, pass_axes(bow), 0.15)
     height = surface_map.height_m(u, 0.0 * u)
     # Curved by 1/m toward the gun's far side; a Gaussian of half the radius lowers it evenly.
@@ -60,27 +51,22 @@ def test_what_is_finer_than_the_radius_is_smoothed_away_and_what_is_wider_kept()
 
 def test_hidden_and_averted_surface_is_not_painted():
     front, back = sheet(lambda x, z: 0.0 * x), sheet(lambda x, z: 0.0 * x + 0.2, half_m=0.2)
-    both = Surface.from_triangles(
-        np.concatenate([front.vertices_m, back.vertices_m]),
-        np.concatenate([front.faces, back.faces + len(front.vertices_m)]),
-        0.1,
-    )
+    vertices_m = np.concatenate([front.vertices_m, back.vertices_m])
+    faces = np.concatenate([front.faces, back.faces + len(front.vertices_m)])
+    both = pd.Surface.from_triangles(vertices_m, faces, 0.1)
     surface_map = SurfaceMap(both, pass_axes(both), 0.1)
     y = both.vertices_m[:, 1]
     assert surface_map.painted[y < 0.1].all()
     assert not surface_map.painted[y > 0.1].any()
 
 
-def test_ends_of_a_slanted_part_follow_the_pass():
+def test_ends_of_a_slanted_part_follow_the_pass_and_impossible_parts_are_refused():
     surface = sheet(lambda x, z: 0.0 * x)
     cut = surface.faces[surface.vertices_m[surface.faces].mean(axis=1) @ [1.0, 0.0, 1.0] < 0.0]
-    part = Surface.from_triangles(surface.vertices_m, cut, 0.05)
+    part = pd.Surface.from_triangles(surface.vertices_m, cut, 0.05)
     surface_map = SurfaceMap(part, pass_axes(part), 0.05)
     low, high = (np.ptp(surface_map.extent_near_m(z, 0.01)) for z in (0.4, -0.3))
     assert low > high + 0.4
-
-
-def test_impossible_parts_are_refused():
     surface = sheet(lambda x, z: 0.0 * x)
     with pytest.raises(PlanError, match='no surface faces the gun'):
         SurfaceMap(surface, pass_axes(surface, outward=(0.0, 1.0, 0.0)), 0.1)
@@ -88,7 +74,7 @@ def test_impossible_parts_are_refused():
     faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
              [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
     with pytest.raises(PlanError, match='closed'):
-        pass_axes(Surface.from_triangles(box, np.array(faces), 0.5))
+        pass_axes(pd.Surface.from_triangles(box, np.array(faces), 0.5))
 
 
 STYLE = PassStyle(0.25, 0.3, acceleration_m_per_s2=2.0, overspray_m=0.2)
@@ -143,16 +129,18 @@ def test_speed_is_even_while_spraying_and_acceleration_kept(motion):
 
 
 def test_serpentine_alternates_and_keeps_the_tool_as_it_is(bowed, motion):
-    path, _ = spray_path(motion)
-    on = path.select(path.flow > 0.0)
-    ways = [on.velocity_m_per_s[on.spray_pass == k].mean(axis=0) for k in range(3)]
+    def by_pass(motion, column: str) -> list[np.ndarray]:
+        """The mean of a column over each pass."""
+        path, _ = spray_path(motion)
+        on = path.select(path.flow > 0.0)
+        return [getattr(on, column)[on.spray_pass == k].mean(axis=0) for k in range(3)]
+
+    ways = by_pass(motion, 'velocity_m_per_s')
     assert ways[0] @ ways[1] < 0.0 < ways[0] @ ways[2]
-    tool_x = [on.rotation[on.spray_pass == k].mean(axis=0)[:, 0] for k in range(3)]
+    tool_x = [axes[:, 0] for axes in by_pass(motion, 'rotation')]
     assert tool_x[0] @ tool_x[1] > 0.9
     one_way = PassStyle(0.25, 0.3, overspray_m=0.2, one_way=True)
-    path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, one_way)))
-    on = path.select(path.flow > 0.0)
-    ways = [on.velocity_m_per_s[on.spray_pass == k].mean(axis=0) for k in range(3)]
+    ways = by_pass(trajectory_of(plan_passes(bowed, LINES_M, one_way)), 'velocity_m_per_s')
     assert min(ways[0] @ ways[1], ways[0] @ ways[2]) > 0.0
     assert motion.trigger_flow.tolist() == [1.0, 0.0] * 3
 
@@ -168,7 +156,7 @@ def test_travel_direction_in_the_tool_frame_is_the_angle_asked_for(bowed):
 
 def test_moves_of_the_robot_follow_the_same_way(bowed):
     passes = plan_passes(bowed, LINES_M, STYLE)
-    moves = planned_moves(passes)
+    moves = gun_passes.planned_moves(passes)
     assert not moves[0].spraying
     switches = np.diff([move.spraying for move in moves])
     assert np.count_nonzero(switches) == 2 * len(passes)
@@ -185,15 +173,20 @@ SPEED, HALF = 0.3, 0.45
 MOTION = serpentine(speed_m_per_s=SPEED, half_width_m=HALF)
 
 
-def test_a_screen_before_the_gun_is_met_while_it_passes():
-    assert contacts(panel(), MOTION, GunEnvelope()) == ()
-    (contact,) = contacts(panel_with_screen(), MOTION, GunEnvelope(radius_m=0.04, before_m=0.2))
+def test_a_screen_before_the_gun_is_met_while_it_passes_and_told_from_one_in_it():
+    assert contacts(panel(), MOTION, pd.GunEnvelope()) == ()
+    (contact,) = contacts(panel_with_screen(), MOTION, pd.GunEnvelope(radius_m=0.04, before_m=0.2))
     assert not contact.by_gun
     # By 200 mm of cylinder over the 150 mm from the TCP to the screen; aside no further than 40.
     assert contact.depth_m == pytest.approx(0.04, abs=0.01)
     assert contact.begin_s == pytest.approx((HALF - 0.05 - 0.04) / SPEED, abs=0.05)
     assert contact.end_s == pytest.approx((HALF + 0.05 + 0.04) / SPEED, abs=0.05)
     assert abs(contact.place_m[1] + 0.1) < 1e-9
+    through = replace(MOTION, positions_m=MOTION.positions_m + np.array([0.0, 0.2, 0.0]))
+    thin = pd.GunEnvelope(radius_m=0.04, before_m=0.0)
+    (contact,) = contacts(panel_with_screen(), through, thin)
+    assert contact.by_gun
+    assert 'touches' in str(contact)
 
 
 @pytest.mark.slow
@@ -206,10 +199,3 @@ def test_a_plan_on_which_the_gun_touches_the_part_is_refused_or_says_so(tmp_path
     touched, *_ = [line for line in kept.warnings if 'the gun touches the part' in line]
     pd.write(kept, tmp_path)
     assert f'! WARNING: {touched}' in (tmp_path / 'passes.mod').read_text()
-
-
-def test_a_gun_in_the_part_is_told_from_a_near_part():
-    through = replace(MOTION, positions_m=MOTION.positions_m + np.array([0.0, 0.2, 0.0]))
-    (contact,) = contacts(panel_with_screen(), through, GunEnvelope(radius_m=0.04, before_m=0.0))
-    assert contact.by_gun
-    assert 'touches' in str(contact)

@@ -22,13 +22,9 @@ from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.kernel.eq2_flux import Ray
 from paint_deposition.model.eq2_projection import Projection
+from paint_deposition.report import write_inference
 from paint_deposition.report.write import write_film
-from paint_deposition.report.write_inference import (
-    effect_entry,
-    file_name,
-    write_effect_file,
-    write_fitted,
-)
+from paint_deposition.report.write_inference import effect_entry, write_effect_file
 from paint_deposition.report.write_plans import gauge_turns
 from small_campaign import small_campaign
 
@@ -55,9 +51,8 @@ def learned(covariate: str, shape: str = 'rising', kind: str = 'factor'):
     u = (law.knots - law.knots[0]) / np.ptp(law.knots)
     h = SHAPES[shape](u) - 1.0
     scale = 10.0 if kind == 'addition' else 1.0
-    return type(law)(
-        low=low, high=high, kind=kind, learned=tuple(scale * h), sd=(scale * SD,) * KNOTS
-    )
+    values = {'learned': tuple(scale * h), 'sd': (scale * SD,) * KNOTS}
+    return type(law)(low=low, high=high, kind=kind, **values)
 
 
 @pytest.fixture(scope='module')
@@ -76,10 +71,8 @@ def film_um(experiment, model: pd.DepositionModel) -> np.ndarray:
 def factor_at(effect, x: np.ndarray) -> np.ndarray:
     """What a law over the ray makes of the flux where incidence or distance are these."""
     cosine, ratio = (x, x) if effect.family == 'standoff' else (np.cos(np.radians(x)), 1.0 + 0 * x)
-    rays = zip(ratio, cosine, strict=True)
-    return np.array(
-        [effect.flux_factor(Ray(0.1, 0.2, *ray, 0.3), *effect.values()) for ray in rays]
-    )
+    rays = (Ray(0.1, 0.2, *ray, 0.3) for ray in zip(ratio, cosine, strict=True))
+    return np.array([effect.flux_factor(ray, *effect.values()) for ray in rays])
 
 
 @pytest.mark.slow
@@ -91,9 +84,7 @@ def factor_at(effect, x: np.ndarray) -> np.ndarray:
         ('edge_distance_m', 'levelling off', 'addition'),
     ],
 )
-def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(
-    covariate, shape, kind, door, tmp_path, monkeypatch
-):
+def test_the_file_gives_the_film_of_the_law(covariate, shape, kind, door, tmp_path, monkeypatch):
     """Laws over the ray as functions, each form; the first of some through a kernel as well."""
     if LEARNED[covariate].flux_factor is None:
         # Every form is written over the ray; what differs over other covariates is their value.
@@ -122,15 +113,12 @@ def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(
             assert np.mean(np.abs(film_um(door, model) - wanted) < band + 0.01) > 0.95
 
 
-def test_the_name_of_an_effect_of_the_library_is_not_taken(tmp_path):
+def test_names_of_effects_of_the_library_are_not_taken_and_those_of_parts_are_files(tmp_path):
     law = learned('time_s')
     file = write_effect_file(tmp_path / 'air_drift.py', law, forms_of(law)[0])
     assert load_effect_file(file).id == 'learned_air_drift'
-
-
-def test_names_of_experiments_become_names_of_files():
     names = {'door': 'door', 'Tür 2/left': 'Tür_2_left', '../..': 'experiment'}
-    assert {name: file_name(name) for name in names} == names
+    assert {name: write_inference.file_name(name) for name in names} == names
 
 
 @pytest.fixture
@@ -143,16 +131,12 @@ def painted():
     return surface, film, stats
 
 
-def test_figures_of_any_kind_are_written(painted, tmp_path):
+def test_figures_of_any_kind_are_written_and_an_older_film_stays_unless_told(painted, tmp_path):
     """Mesh and table are held against each other where `paint simulate` is tried out."""
-    surface, film, stats = painted
-    details = {'poses': np.int64(7), 'rate': math.inf}
-    *_, figures = write_film(tmp_path / 'new', surface, film, stats, details=details)
+    details, stats = {'poses': np.int64(7), 'rate': math.inf}, painted[-1]
+    *_, figures = write_film(tmp_path / 'new', *painted, details=details)
     content = json.loads(figures.read_text())
     assert (content['mean_um'], content['poses'], content['rate']) == (stats.mean_um, 7, None)
-
-
-def test_an_older_film_stays_unless_told(painted, tmp_path):
     surface, film, stats = painted
     csv = write_film(tmp_path, surface, film, stats)[1]
     with pytest.raises(pd.PaintError, match=r'film\.ply is there already'):
@@ -176,20 +160,16 @@ def fitted(tmp_path_factory):
 def file(tmp_path_factory, fitted) -> Path:
     path = tmp_path_factory.mktemp('model') / 'model.yaml'
     known = fitted.posterior, estimates(fitted.history[-1].fit)
-    write_fitted(path, fitted.study, fitted.history, *known)
+    write_inference.write_fitted(path, fitted.study, fitted.history, *known)
     return path
 
 
 @pytest.mark.slow
-def test_fitted_numbers_have_few_digits_and_those_by_hand_all_of_theirs(file: Path):
+def test_fitted_numbers_have_few_digits_and_give_the_fitted_film(file, fitted):
     numbers = re.findall(r': (-?[\d.]+)(?:e[+-]?\d+)?\b', file.read_text())
     assert len(numbers) > 10
     long = [n for n in numbers if len(n.lstrip('-0.').replace('.', '')) > 8]
     assert long == [str(BY_HAND)]
-
-
-@pytest.mark.slow
-def test_the_file_gives_the_fitted_film(file: Path, fitted):
     experiment = fitted.study.campaign.experiments[1]
 
     def film_on_vertices_um(model: pd.DepositionModel) -> np.ndarray:
@@ -198,10 +178,8 @@ def test_the_file_gives_the_fitted_film(file: Path, fitted):
         integrator.add(experiment.path)
         return integrator.gauge_um
 
-    expected = film_on_vertices_um(fitted.model)
-    assert (
-        np.abs(film_on_vertices_um(pd.read_model(file)) - expected).max() < 1e-6 * expected.max()
-    )
+    expected, found = map(film_on_vertices_um, (fitted.model, pd.read_model(file)))
+    assert np.abs(found - expected).max() < 1e-6 * expected.max()
 
 
 def test_the_gauge_stands_level_also_on_faces_square_to_the_front():

@@ -13,7 +13,6 @@ from matplotlib.image import imread
 
 import paint_deposition as pd
 from booth import door, panel, serpentine
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.comparison.comparison import compare
@@ -21,7 +20,6 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.part.surface import Surface
 from paint_deposition.report.colour_scales import BELOW, HIGH, WITHIN
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.drawing import PartPicture, View, label_points, save_picture
@@ -116,10 +114,8 @@ def test_the_bands_take_the_share_of_the_picture_that_the_figures_tell():
     pixels, box = pixels_of(figure), figure.axes[0].get_window_extent()
     rows = slice(len(pixels) - int(box.y1), len(pixels) - int(box.y0))
     area = pixels[rows, int(box.x0) : int(box.x1)]
-    counts = [
-        np.sum(np.abs(area - np.round(255 * np.array(to_rgb(colour)))).sum(axis=2) < 4)
-        for colour in (BELOW, WITHIN, HIGH)
-    ]
+    bands = (np.round(255 * np.array(to_rgb(colour))) for colour in (BELOW, WITHIN, HIGH))
+    counts = [np.sum(np.abs(area - band).sum(axis=2) < 4) for band in bands]
     # From 10 to 30 um across the panel: 15 and 21 um lie a quarter and eleven twentieths along.
     assert np.array(counts) / sum(counts) == pytest.approx([0.25, 0.3, 0.45], abs=0.005)
     legends = filter(None, (axes.get_legend() for axes in figure.axes))
@@ -152,11 +148,11 @@ def folded(spacing_m):
     return triangulated(lambda x, z: 0.2 * x**2 + 0.9 * np.abs(z - 0.03), spacing_m, jitter=0.2)
 
 
-def test_what_is_seen_is_drawn_over_what_it_hides():
+def test_what_is_seen_is_drawn_over_what_it_hides_and_edges_are_outline_and_fold():
     vertices, faces = folded(0.02)
     behind = vertices + np.array([0.15, 0.4, 0.05])
     both = np.concatenate([faces, faces + len(vertices)])
-    surface = Surface.from_triangles(np.concatenate([vertices, behind]), both, 0.05)
+    surface = pd.Surface.from_triangles(np.concatenate([vertices, behind]), both, 0.05)
     picture = PartPicture.of(surface)
     assert 0.5 < picture.seen.mean() < 0.9
     middle = surface.vertices_m[picture.faces].mean(axis=1)
@@ -167,11 +163,8 @@ def test_what_is_seen_is_drawn_over_what_it_hides():
     assert (rows == np.flatnonzero(picture.seen)).all()
     far = (middle @ picture.view.toward)[~picture.seen]
     assert far.max() < (middle @ picture.view.toward)[picture.seen].max()
-
-
-def test_edges_are_those_of_the_outline_and_the_fold_alone():
     vertices, faces = folded(0.01)
-    picture = PartPicture.of(Surface.from_triangles(vertices, faces, 0.05))
+    picture = PartPicture.of(pd.Surface.from_triangles(vertices, faces, 0.05))
     assert 0 < len(picture.edges_m) < 400
 
 
@@ -186,15 +179,15 @@ def test_a_point_is_labelled_beside_what_is_written_there():
 @pytest.mark.slow
 def test_thicker_columns_are_not_cut_off_by_a_thin_one(tmp_path):
     study = Study.of(small_campaign(tmp_path, experiments=('door',), style='columns'))
-    data = ReportData((compare(study, DepositionModel()),))
+    data = ReportData((compare(study, pd.DepositionModel()),))
     thin = data.profiles[0]
     thick = replace(thin, lines_um=2.0 * thin.lines_um)
     vars(data)['profiles'] = [thin, thick]
     figure = comparison_figure(data)
     tops_um = [film.get_ylim()[1] for film in figure.axes[::2]]
     assert tops_um[0] == tops_um[1] > np.max(thick.lines_um[0])
-    few = replace(thin, line_m=np.empty(0), lines_um=np.empty((1, 0)), passes_um=np.empty((0, 0)))
-    vars(data)['profiles'] = [few]
+    none = {'line_m': np.empty(0), 'lines_um': np.empty((1, 0)), 'passes_um': np.empty((0, 0))}
+    vars(data)['profiles'] = [replace(thin, **none)]
     assert len(comparison_figure(data).axes) == 2
 
 

@@ -127,7 +127,6 @@ def test_a_page_with_a_token_is_for_those_who_have_it(serve):
     assert status(page.url) == status(bare, Cookie=f'{page.cookie}=secret') == 200
     for path in ('', 'part.js', 'scene', '?token=wrong', 'scene?token=secre'):
         assert status(bare + path) == 403
-    # Only the upgrade is missing.
     assert status(f'{bare}scene?token=secret') == 400
 
 

@@ -16,13 +16,8 @@ from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.report import words
-from paint_deposition.report.charts import (
-    footprint_figure,
-    learned_figure,
-    map_figure,
-    profile_figure,
-)
+from paint_deposition.report import charts, words
+from paint_deposition.report.charts import footprint_figure, learned_figure, map_figure
 from paint_deposition.report.data import ReportData
 from small_campaign import small_campaign
 
@@ -35,34 +30,25 @@ class HoleBuild(Effect):
     )
 
 
-def test_the_unit_in_a_parameters_name_is_not_said_twice():
+def test_units_are_not_said_twice_and_numbers_have_no_computers_exponent():
     wake = load_effect_file(SAMPLES / 'my_effect.py')
     unit = wake.parameters()['loss_per_m_per_s']['unit']
     assert words.parameter_words('loss_per_m_per_s', unit) == 'loss'
     assert words.in_unit(unit, 2e-9) == ('per m/s', '2 × 10⁻⁹')
     unit = FlowDrift.parameters()['drift_per_pass']['unit']
-    assert (words.parameter_words('drift_per_pass', unit), words.in_unit(unit, 0.02)[0]) == (
-        'drift', 'per pass',
-    )  # fmt: skip
-    assert words.parameter_words('shift_down_m', 'm') == 'shift down'
-    assert words.parameter_words('gain', '1') == 'gain'
-    assert words.parameter_words('s', 's') == 's'
+    assert words.in_unit(unit, 0.02)[0] == 'per pass'
+    told = {'drift_per_pass': (unit, 'drift'), 'shift_down_m': ('m', 'shift down')}
+    for name, (unit, expected) in (told | {'gain': ('1', 'gain'), 's': ('s', 's')}).items():
+        assert words.parameter_words(name, unit) == expected
+    found = [words.number(value) for value in (0.0, 1234.0, -0.00012345, 2.5e-9, 4e8)]
+    assert found == ['0', '1234', '−0.000123', '2.5 × 10⁻⁹', '4 × 10⁸']
 
 
-def test_an_effect_without_a_docstring_is_told_by_its_signature_or_its_parameter():
+def test_effects_without_a_docstring_and_learned_laws_are_told_by_what_they_have():
     assert words.effect_meaning(HoleBuild) == 'Share of paint more at holes.'
     signed = type('Signed', (HoleBuild,), {'signature': 'more paint around holes'})
     assert words.effect_meaning(signed) == 'More paint around holes.'
     assert words.effect_meaning(FlowDrift) == FlowDrift.__doc__.splitlines()[0]
-
-
-def test_numbers_have_no_computers_exponent():
-    assert [words.number(v) for v in (0.0, 1234.0, -0.00012345, 2.5e-9, 4e8)] == [
-        '0', '1234', '−0.000123', '2.5 × 10⁻⁹', '4 × 10⁸',
-    ]  # fmt: skip
-
-
-def test_learned_laws_are_told_by_what_they_depend_on():
     name = 'learned law over the time since the motion began'
     assert words.effect_name('learned:time_s') == name
     assert words.effect_name('edge_build and learned:time_s') == f'edge build and {name}'
@@ -77,13 +63,12 @@ def test_a_learned_law_is_told_by_its_curve_and_its_range():
     assert words.learned_words(passes)[1] == ('over', '1 to 6', '')
     fog = LEARNED['height_fraction'](kind='addition', learned=(2.0, -0.5))
     assert words.learned_words(fog)[0] == ('addition', '−0.5 to 2', 'µm')
-    grid = PartGrid(
-        part_m=(1.2, 0.1, 0.5), low_m=(-0.5, -0.2), high_m=(0.5, 0.2), columns=2, rows=2
-    )
+    ends = {'low_m': (-0.5, -0.2), 'high_m': (0.5, 0.2)}
+    grid = PartGrid(part_m=(1.2, 0.1, 0.5), **ends, columns=2, rows=2)
     map_ = LEARNED['place'](maps=(grid,), learned=(0.1, 0.0, 0.0, -0.2))
-    assert words.learned_words(map_) == [
-        ('factor', '0.8 to 1.1', ''), ('over', '1000 × 400', 'mm of a part'),
-    ]  # fmt: skip
+    factor, over = words.learned_words(map_)
+    assert factor == ('factor', '0.8 to 1.1', '')
+    assert over == ('over', '1000 × 400', 'mm of a part')
     # Mean and first harmonic add up on the heavier side.
     ring = LEARNED['footprint'](reach_m=0.3, learned=(0.0,) * 5 + (0.1, 0.2, 0.0, 0.0, 0.0))
     assert words.learned_words(ring)[0] == ('factor', '0.9 to 1.3', '')
@@ -92,16 +77,12 @@ def test_a_learned_law_is_told_by_its_curve_and_its_range():
 KNOTS = 24
 
 
-def like(covariate: str, low: float, high: float, curve, kind: str = 'factor'):
+def like(covariate: str, low: float, high: float, curve):
     """A learned law with the values of a function at its knots."""
     law = LEARNED[covariate](low=low, high=high, learned=(0.0,) * KNOTS)
     many = np.linspace(low, high, 100_001)
     at_knots = np.interp(law.knots, law.axis(many), curve(many))
-    return law.model_copy(update={'learned': tuple(at_knots), 'kind': kind})
-
-
-def squeezed(distance_m: np.ndarray) -> np.ndarray:
-    return 0.4 * np.exp(-((distance_m / 0.03) ** 2))
+    return law.model_copy(update={'learned': tuple(at_knots)})
 
 
 @pytest.fixture(scope='module')
@@ -115,7 +96,7 @@ def shown(study: Study, *effects) -> ReportData:
 
 @pytest.mark.slow
 def test_a_curve_is_drawn_with_its_closed_form_and_with_its_band_if_it_is_known(study):
-    law = like('edge_distance_m', 0.0, 0.25, squeezed)
+    law = like('edge_distance_m', 0.0, 0.25, lambda d_m: 0.4 * np.exp(-((d_m / 0.03) ** 2)))
     plain = learned_figure(shown(study, law))
     curve = plain['charts'][0]['data'][0]
     known = law.model_copy(update={'sd': (0.02,) * (KNOTS - 1) + (0.5,)})
@@ -137,10 +118,8 @@ def test_a_map_shows_what_it_does_where_the_readings_of_its_part_lie(study):
     door = study.campaign.experiments[1].measured_points
     place = {'low_m': (-0.4, -0.3), 'high_m': (0.4, 0.3), 'columns': 3, 'rows': 2}
     learned = (-2.0, -2.0, -2.0, 0.1, 0.2, 0.3)
-    grids = (
-        PartGrid(part_m=tuple(door.extent_m.tolist()), **place),
-        PartGrid(part_m=(9.0, 9.0, 9.0), **place),
-    )
+    sizes_m = tuple(door.extent_m.tolist()), (9.0, 9.0, 9.0)
+    grids = tuple(PartGrid(part_m=size_m, **place) for size_m in sizes_m)
     assert map_figure(shown(study)) is None
     maps = map_figure(shown(study, LearnedMap(maps=grids, learned=learned * 2)))
     [first, dots], [second] = (chart['data'] for chart in maps['charts'])
@@ -176,9 +155,9 @@ def test_the_footprint_is_shown_with_its_band(study):
     radius_m, eq1 = np.array([0.0, 0.1, 0.2]), np.array([0.5, 1.0, 0.1])
     profile = FootprintProfile(radius_m, eq1, eq1 + 0.1, np.array([0.5, 0.1, 0.01]))
     figures = DiscrepancyFigures(0.02, 0.0, 0.03, 0.1, (0.06, 2.0), profile)
-    assert profile_figure(shown(study)) is None
+    assert charts.profile_figure(shown(study)) is None
     diagnosed = replace(shown(study), diagnosis=SimpleNamespace(discrepancy=figures))
-    band, plain, found = profile_figure(diagnosed)['charts'][0]['data']
+    band, plain, found = charts.profile_figure(diagnosed)['charts'][0]['data']
     assert (plain['y'] == eq1).all()
     assert (found['y'] == eq1 + 0.1).all()
     low, high = band['y'][:3], band['y'][:2:-1]

@@ -1,7 +1,4 @@
-"""Eqs. (1) and (2) of Conner et al. (2002) by plain quadrature: the yardstick of the tests alone.
-
-The generator never calls this; a clean film must agree with it.
-"""
+"""Eqs. (1) and (2) of Conner et al. (2002) by plain quadrature, which a clean film follows."""
 
 from __future__ import annotations
 
@@ -25,9 +22,7 @@ def planar_flux(p: Pattern, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return p.K1_cm3_per_s * ((1 - p.K2) * f * g1 + p.K2 * g2)
 
 
-def film_um(
-    p: Pattern, motion: Motion, points_m: np.ndarray, normals: np.ndarray, step_s: float = 0.01
-) -> np.ndarray:
+def film_um(p: Pattern, motion: Motion, points_m, normals, step_s: float = 0.01) -> np.ndarray:
     """Eq. (2) summed over the time the trigger is on."""
     film = np.zeros(len(points_m))
     for on, off in motion.trigger_s.reshape(-1, 2):

@@ -11,10 +11,9 @@ OUTLINE_MARGIN_M = 0.15
 
 @dataclass(frozen=True)
 class Bend:
-    """A line along which the surface's slope changes by `slope`, spread over about 4 x `soft_m`.
+    """A line along which the slope changes by `slope`, spread over about 4 x `soft_m`.
 
-    The surface moves by slope x distance on the side where direction x (coordinate - at) > 0;
-    slope < 0 falls away from the gun (convex), > 0 comes back to it (concave).
+    The side where direction x (coordinate - at) > 0 falls away from the gun if slope < 0 (convex).
     """
 
     axis: str
@@ -81,10 +80,7 @@ class Part:
         return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
     def curvature(self, x: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Principal curvatures (low, high) in 1/m, positive where concave to the gun.
-
-        Exact, from the second fundamental form of the graph.
-        """
+        """Principal curvatures (low, high) in 1/m, exact, positive where concave to the gun."""
         y_x, y_z = self.slope(x, z)
         y_xx = np.full_like(y_x + y_z, -1.0 / self.crown_x_m)
         y_zz = np.full_like(y_xx, -1.0 / self.crown_z_m)
@@ -94,16 +90,13 @@ class Part:
             else:
                 y_zz = y_zz + bend.second(z)
         w2 = 1.0 + y_x**2 + y_z**2
-        mean = ((1 + y_z**2) * y_xx - 2 * y_x * y_z * self.twist + (1 + y_x**2) * y_zz) / (
-            2 * w2**1.5
-        )
+        twice_mean = (1 + y_z**2) * y_xx - 2 * y_x * y_z * self.twist + (1 + y_x**2) * y_zz
+        mean = twice_mean / (2 * w2**1.5)
         gauss = (y_xx * y_zz - self.twist**2) / w2**2
         root = np.sqrt(np.maximum(mean**2 - gauss, 0.0))
         return mean - root, mean + root
 
-    def curvature_over(
-        self, x: np.ndarray, z: np.ndarray, reach_m: float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def curvature_over(self, x, z, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
         """Principal curvatures averaged over a disc of `reach_m`: a field does not see a point."""
         low, high = self.curvature(x, z)
         low, high, count = low.copy(), high.copy(), 1

@@ -20,12 +20,9 @@ def stream(seed: int, purpose: int) -> np.random.Generator:
 
 
 def draw_jobs(
-    seed: int,
-    truths: list[Truth],
-    experiments: tuple[str, ...],
-    emission_offset_m: float = 0.05,
+    seed: int, truths: list[Truth], experiments: tuple[str, ...], emission_offset_m: float = 0.05,
     gun: str | None = None,
-) -> tuple[Pattern, list[Job]]:
+) -> tuple[Pattern, list[Job]]:  # fmt: skip
     rng = stream(seed, 2)
     door = draw_door(rng)
     for truth in truths:
@@ -73,12 +70,8 @@ def solids_cm3_per_s(rng: np.random.Generator) -> float:
 
 def brush_beside(pattern: Pattern, width: float) -> Pattern:
     """Another brush of the same bell: its width and flow times so much, and more in the middle."""
-    return replace(
-        pattern.scaled(width),
-        K1_cm3_per_s=width * pattern.K1_cm3_per_s,
-        K2=pattern.K2 + 0.15,
-        K3=0.7 * pattern.K3,
-    )
+    shape = {'K2': pattern.K2 + 0.15, 'K3': 0.7 * pattern.K3}
+    return replace(pattern.scaled(width), K1_cm3_per_s=width * pattern.K1_cm3_per_s, **shape)
 
 
 def timed(part: Part, plan: Plan, rng: np.random.Generator) -> tuple[Plan, Motion]:

@@ -24,21 +24,15 @@ POSE_TOPIC, STATE_TOPIC = '/atomizer/pose', '/atomizer/state'
 
 
 def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False) -> Path:
-    """Write the campaign and return the path of its campaign.yaml.
-
-    `truth/truth.json` beside it has what is hidden; campaign.yaml does not mention it. Raises
-    FileExistsError when the folder exists and is not empty.
-    """
+    """Write campaign.yaml (its path is returned) into a new folder, the hidden into `truth/`."""
     folder = Path(folder)
     if folder.exists() and any(folder.iterdir()):
         raise FileExistsError(f'{folder} is not empty; choose another folder')
     (folder / 'truth').mkdir(parents=True, exist_ok=True)
     entries = []
     for experiment in campaign.experiments:
-        mesh = f'{experiment.part.kind}.stl'
-        trimesh.Trimesh(experiment.vertices_m, experiment.faces, process=False).export(
-            folder / mesh
-        )
+        mesh, body = f'{experiment.part.kind}.stl', (experiment.vertices_m, experiment.faces)
+        trimesh.Trimesh(*body, process=False).export(folder / mesh)
         name, plan = experiment.name, experiment.plan
         write_bag(experiment.log, folder / name, plan.flow, plan.brushes)
         _write_readings(experiment.readings, folder / f'{name}.csv', sigma_column)
@@ -58,10 +52,7 @@ def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False)
 
 
 def write_bag(log: Log, folder: Path, flow: float = 1.0, brushes: tuple[int, ...] = ()) -> None:
-    """A rosbag2 folder (MCAP): PoseStamped poses; triggers as Bool at their log time.
-
-    A flow other than the usual one, and brushes, are written with each trigger, as AtomizerState.
-    """
+    """A rosbag2 folder (MCAP): triggers as Bool, with brushes or another flow as AtomizerState."""
     types = get_typestore(Stores.ROS2_JAZZY)
     types.register(get_types_from_msg(ATOMIZER_STATE.read_text(), STATE_TYPE))
     time_type = types.types['builtin_interfaces/msg/Time']

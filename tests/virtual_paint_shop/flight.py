@@ -17,10 +17,7 @@ _NEWTON_STEPS = 8
 
 
 def _compiled(function):
-    """The function compiled, and kept under the name of its module, which it remembers.
-
-    The demo and the tests import this folder under different names.
-    """
+    """Kept under the name of its module: demo and tests import this folder by other names."""
     function.__qualname__ = f'{__name__}.{function.__name__}'
     return numba.njit(cache=True)(function)
 
@@ -44,10 +41,8 @@ class Air:
     """What the air does to a parcel under way.
 
     drift_m: (n, 3) displacement of the mean droplet at the model plane, per slice, part frame.
-    narrowing: (p,) per parcel; 0 flies straight from the emission point, 1 parallel to the axis
-        beyond the model plane, < 0 opens wider than the cone.
-    growth: the displacement grows with this power of the way: 1 for a parcel that moves with the
-        air at once, 2 for one that the air only begins to pull.
+    narrowing: (p,) 0 flies straight from the emission point, 1 parallel to the axis beyond it.
+    growth: power of the way that displacement grows with: 1 at once, 2 where air begins to pull.
     """
 
     drift_m: np.ndarray
@@ -185,11 +180,9 @@ def fly(
     part: Part, slices: Slices, parcels: Parcels, air: Air, points_m: np.ndarray,
     model_plane_m: float, emission_offset_m: float, parcels_total: int,
 ) -> Landings:  # fmt: skip
-    """Trace about `parcels_total` parcels and keep those that land within a probe.
+    """Trace about so many parcels, in proportion to durations, and keep those within a probe.
 
-    Each slice emits parcels in proportion to its duration, taken in turn from the pool, one
-    after another. The film share of a landing is
-    its solids (cm^3 = um m^2) spread over the probe by an Epanechnikov kernel (1/m^2).
+    A landing's film is its solids (cm^3 = um m^2) spread by an Epanechnikov kernel (1/m^2).
     """
     duration = slices.time_1_s - slices.time_0_s
     count = np.maximum(np.rint(duration * parcels_total / duration.sum() / 64), 4).astype(int) * 64

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import qmc
 
 from .doors import Part
+
+# Of readings from free edges.
+KEEP_OFF_M = 0.015
 
 
 @dataclass(frozen=True)
@@ -38,13 +42,12 @@ class GaugeNoise:
         return np.round(np.maximum(reading, 0.0), 2)
 
 
-@dataclass(frozen=True)
-class Session:
-    """One visit with the gauge to a part: what was written down, and why it is not the film."""
+class Session(NamedTuple):
+    """What was written down at a part, its film over that of its kind, and the gauge's zero."""
 
-    thickness_um: np.ndarray  # (n,) as written down
-    level: float  # the part's film over that of its kind
-    offset_um: float  # of the gauge's zero
+    thickness_um: np.ndarray
+    level: float
+    offset_um: float
 
 
 @dataclass(frozen=True)
@@ -84,17 +87,14 @@ class Readings:
         return Readings(*(column[rows] for column in vars(self).values()))
 
 
-def layout(
-    part: Part, style: str, readings: int, repeats: int, rng: np.random.Generator,
-    keep_off_m: float = 0.015,
-) -> Spots:  # fmt: skip
+def layout(part: Part, style: str, readings: int, repeats: int, rng: np.random.Generator) -> Spots:
     """`readings` in all, of which `repeats` are second and third visits to some of the points."""
     points = max(readings - repeats, 3)
     if style == 'random':
-        x, z = scatter(part, points, rng, keep_off_m)
+        x, z = scatter(part, points, rng, KEEP_OFF_M)
         group = np.full(x.size, '')
     else:
-        x, z, group = _lines(part, style, points, rng, keep_off_m)
+        x, z, group = _lines(part, style, points, rng)
     times = np.ones(x.size, int)
     again = rng.permutation(x.size)[: max(int(np.ceil(repeats / 2)), 1)]
     for n in range(repeats):
@@ -106,10 +106,7 @@ def measure(
     spot: np.ndarray, film_um: np.ndarray, expected_um: np.ndarray, noise: GaugeNoise,
     rng: np.random.Generator,
 ) -> Session:  # fmt: skip
-    """Read a part anew: another part of its kind, in another session.
-
-    All arrays (n,). `spot` names the place of each reading; repeats share it and its texture.
-    """
+    """Read (n,) films of another part in another session; repeats share spot and texture."""
     places, place = np.unique(spot, return_inverse=True)
     level = 1.0 + noise.level * rng.normal()
     offset = noise.session_offset_um * rng.normal()
@@ -134,9 +131,7 @@ def mistyped(reading_um: float, rng: np.random.Generator) -> float:
     return float(''.join(digits))
 
 
-def scatter(
-    part: Part, count: int, rng: np.random.Generator, keep_off_m: float
-) -> tuple[np.ndarray, np.ndarray]:
+def scatter(part: Part, count: int, rng, keep_off_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Quasi-random points on the surface, away from free edges."""
     cube = qmc.Sobol(2, scramble=True, seed=int(rng.integers(2**31))).random(1024)
     x, z = (cube[:, 0] - 0.5) * part.width_m, cube[:, 1] * part.height_m
@@ -174,7 +169,7 @@ def keep_clear(part: Part, spots: Spots) -> Spots:
 
 
 def _lines(
-    part: Part, style: str, points: int, rng: np.random.Generator, keep_off_m: float
+    part: Part, style: str, points: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Four or five columns, or five to seven rows, as one tapes them on a door."""
     lines = int(rng.integers(4, 6)) if style == 'columns' else int(rng.integers(5, 8))
@@ -183,7 +178,7 @@ def _lines(
     across = np.linspace(0.08, 0.92, lines)[number]
     each = np.bincount(number, minlength=lines)[number]
     share = place / np.maximum(each - 1, 1)
-    room = keep_off_m + 0.001
+    room = KEEP_OFF_M + 0.001
     name, aside, up = ('column', across, share) if style == 'columns' else ('row', share, across)
     z = room + up * (part.height_m - 2 * room)
     x = part.left(z) + room + aside * (0.5 * part.width_m - part.left(z) - 2 * room)

@@ -100,36 +100,29 @@ class Job:
 
 
 def draw_plan(
-    rng: np.random.Generator,
-    part: Part,
-    index_m: float,
-    half_width_m: float,
-    direction: str,
+    rng: np.random.Generator, part: Part, index_m: float, half_width_m: float, direction: str,
     gun: str,
-) -> Plan:
+) -> Plan:  # fmt: skip
     """A believable plan; `gun` is 'outside' (spraying well past the edges) or 'near_edge'."""
     across = part.height_m if direction == 'horizontal' else part.width_m
     outside = rng.uniform(0.35, 0.60) * half_width_m
     margin = rng.uniform(0.03, 0.08) * rng.choice([-1.0, 1.0])
     return Plan(
-        direction,
-        index_m,
-        int(np.clip(np.rint(across / index_m) + 1, 3, 6)),
-        standoff_m=rng.uniform(0.20, 0.30),
-        follow=rng.uniform(0.3, 0.9),
+        direction, index_m, int(np.clip(np.rint(across / index_m) + 1, 3, 6)),
+        standoff_m=rng.uniform(0.20, 0.30), follow=rng.uniform(0.3, 0.9),
         overrun_m=outside + 0.04 if gun == 'outside' else rng.uniform(0.10, 0.20),
         gun_margin_m=outside if gun == 'outside' else margin,
         roll_rad=rng.choice([0.0, np.pi / 2, np.pi, rng.uniform(-np.pi, np.pi)]),
         teach_error_m=rng.uniform(0.001, 0.006),
-    )
+    )  # fmt: skip
 
 
 def drive(part: Part, plan: Plan, rng: np.random.Generator) -> Motion:
     """Serpentine passes from the top down (or the left on), joined by rounded links."""
     tcps, axes, numbers, fires = [], [], [], []
-    along = (0.0, part.height_m)
-    if plan.direction == 'horizontal':
-        along = (-0.5 * part.width_m, 0.5 * part.width_m)
+    along = {
+        'horizontal': (-0.5 * part.width_m, 0.5 * part.width_m), 'vertical': (0.0, part.height_m),
+    }[plan.direction]  # fmt: skip
     for number in range(plan.passes):
         rank = plan.passes - 1 - number if plan.from_below else number
         place = (0.5 * (plan.passes - 1) - rank) * plan.index_m
@@ -151,12 +144,15 @@ def drive(part: Part, plan: Plan, rng: np.random.Generator) -> Motion:
     return _in_time(*together, plan)
 
 
+def across(plan: Plan) -> np.ndarray:
+    return np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])
+
+
 def hold(part: Part, plan: Plan, place_m: np.ndarray, standoff_m: float, open_s: float) -> Motion:
     """The gun stands square before a place of the part, and is open for so long."""
     x, _, z = place_m
     normal = part.normal(np.array(x), np.array(z))
-    across = np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])
-    turn = orthonormal(np.stack([across, -normal, -normal], axis=-1))
+    turn = orthonormal(np.stack([across(plan), -normal, -normal], axis=-1))
     time = np.arange(0.0, open_s + 2.0 * CLOSED_S, STEP_S)
     tcp = part.point(np.array(x), np.array(z)) + standoff_m * normal
     return Motion(
@@ -166,10 +162,10 @@ def hold(part: Part, plan: Plan, place_m: np.ndarray, standoff_m: float, open_s:
     )  # fmt: skip
 
 
-def slices(motion: Motion, flow_cm3_per_s, slice_m: float = SLICE_M) -> Slices:
+def slices(motion: Motion, flow_cm3_per_s) -> Slices:
     """Cut the spraying into short slices; `flow_cm3_per_s(times)` is the true flow."""
     travelled = np.concatenate([[0.0], np.cumsum(_steps(motion.tcp_m))])
-    cuts = np.interp(np.arange(0.0, travelled[-1], slice_m), travelled, motion.time_s)
+    cuts = np.interp(np.arange(0.0, travelled[-1], SLICE_M), travelled, motion.time_s)
     after = (motion.trigger_s[:, None] + np.concatenate([[0.0], _AFTER_TRIGGER_S])).ravel()
     cuts = np.unique(np.concatenate([cuts, after[after < motion.time_s[-1]]]))
     first, last = cuts[:-1], cuts[1:]
@@ -192,13 +188,9 @@ def record(motion: Motion, sample_s: float, rng: np.random.Generator) -> Log:
     flips = np.cumprod(np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0, -1, 1))
     quaternions[1:] *= flips[:, None]
     events = np.concatenate([[ticks[0]], motion.trigger_s])
-    return Log(
-        epoch + np.rint(ticks * 1e9).astype(np.int64),
-        tcp,
-        quaternions,
-        epoch + np.rint(events * 1e9).astype(np.int64),
-        np.concatenate([[False], motion.trigger_on]),
-    )
+    stamps, switched = (epoch + np.rint(at * 1e9).astype(np.int64) for at in (ticks, events))
+    opens = np.concatenate([[False], motion.trigger_on])
+    return Log(stamps, tcp, quaternions, switched, opens)
 
 
 def orthonormal(turn: np.ndarray) -> np.ndarray:
@@ -243,11 +235,9 @@ def _in_time(
         reversal = np.min(np.abs(path[:, None] - corners[None, :]), axis=1)
     speed = plan.speed_m_per_s * (1.0 - 0.5 * np.exp(-((reversal / 0.03) ** 2)))
     time = np.concatenate([[0.0], np.cumsum(np.diff(path) / (0.5 * (speed[1:] + speed[:-1])))])
-    across = np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])
-    turn = orthonormal(np.stack([np.broadcast_to(across, axis.shape), axis, axis], axis=-1))
-    return Motion(
-        time, tcp, turn, number, reversal, time[trigger], np.arange(trigger.size) % 2 == 0
-    )
+    turn = orthonormal(np.stack([np.broadcast_to(across(plan), axis.shape), axis, axis], axis=-1))
+    opens = np.arange(trigger.size) % 2 == 0
+    return Motion(time, tcp, turn, number, reversal, time[trigger], opens)
 
 
 def _steps(tcp_m: np.ndarray) -> np.ndarray:

@@ -1,8 +1,6 @@
-"""Paint parcels: equal shares of the sprayed solids, drawn from the plume's distribution.
+"""Paint parcels: equal shares of the sprayed solids, drawn from the plume by inverse functions.
 
-A parcel is a point (x, y) of the model plane it flies through and a droplet size; one leaves
-after another. The clean plume is the volcano of Conner et al. (2002), eq. (1), drawn by inverse
-distribution functions; the formula itself is never evaluated at a surface.
+The plume is the volcano of Conner et al. (2002), eq. (1), which is never evaluated at a surface.
 """
 
 from __future__ import annotations
@@ -46,11 +44,7 @@ class Parcels:
 
 
 def lattice(count: int, seed: int) -> np.ndarray:
-    """Kronecker points (count, 2) in the unit square, shifted at random.
-
-    Steps by powers of the plastic number: with the emission order as a third coordinate they fill
-    the volume evenly, over any run of successive parcels.
-    """
+    """Kronecker points (count, 2) in the unit square: any successive ones fill it evenly."""
     plastic = 1.324717957244746
     shift = np.random.default_rng(seed).random(2)
     return (shift + np.arange(count)[:, None] / [plastic, plastic**2]) % 1.0
@@ -59,8 +53,7 @@ def lattice(count: int, seed: int) -> np.ndarray:
 def conner_plume(pattern: Pattern, count: int, seed: int) -> Parcels:
     """`count` equal parcels whose density on the model plane is eq. (1).
 
-    Square -> disc (Shirley and Chiu) -> radius by the inverse of the radial distribution, then
-    angle by the inverse of the angular one at that radius: even points stay even.
+    Square -> disc (Shirley and Chiu) -> radius -> angle by inverses: even points stay even.
     """
     square = lattice(count, seed)
     disc, turn = _disc(square[:, 0], square[:, 1])
@@ -103,10 +96,7 @@ def _lopsided_angle(turn: np.ndarray, k: np.ndarray) -> np.ndarray:
 
 
 def mobility(u: np.ndarray) -> np.ndarray:
-    """Relative air-carried drift of log-normal droplets (30 um volume median, ln-width 0.4).
-
-    Small droplets relax to the draught, large ones fly through it: drift ~ diameter^-0.7.
-    """
+    """Relative drift ~ diameter^-0.7 of log-normal droplets (30 um median, ln-width 0.4)."""
     width = 0.4 * 0.7
     z = np.clip(norm.ppf(u), -2.5, 2.5)
     carried = np.exp(-width * z)
@@ -122,9 +112,7 @@ def half_width_m(parcels: Parcels) -> float:
     return float(edges[above[-1] + 1] - edges[above[0]])
 
 
-def draw_pattern(
-    rng: np.random.Generator, half_width: float, flow_cm3_per_s: float, emission_offset_m: float
-) -> Pattern:
+def draw_pattern(rng, half_width: float, flow_cm3_per_s: float, emission_offset_m) -> Pattern:
     """A believable bell pattern with the given SB50 (metres)."""
     ranges = ((0.05, 0.35), (0.0, 0.3), (-np.pi, np.pi), (0.28, 0.40), (0.13, 0.20), (0.20, 0.30))
     shape = (rng.uniform(*limits) for limits in ranges)

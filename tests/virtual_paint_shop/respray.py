@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from .draw import stream, timed
-from .gauge import GaugeNoise
 from .jobs import Job, Plan, hold
 from .parcels import Pattern
 from .shop import PARCELS, USUAL_NOISE, Bench, Campaign, Experiment, gauged
@@ -34,22 +33,13 @@ def sprayed_again(
 
 
 def respray(
-    pattern: Pattern,
-    truths: list[Truth],
-    experiment: Experiment,
-    changes: Sequence[str],
-    seed: int,
-    *,
-    stand: Mapping[str, float] | None = None,
-    noise: GaugeNoise = USUAL_NOISE,
-    parcels: int = PARCELS,
-) -> Experiment:
+    pattern: Pattern, truths: list[Truth], experiment: Experiment, changes: Sequence[str],
+    seed: int, *, stand: Mapping[str, float] | None = None, parcels: int = PARCELS,
+) -> Experiment:  # fmt: skip
     """Paint another part like that of an experiment, with changes, and measure the same points.
 
-    stand: where the gun stands still instead of running its passes (x_m, y_m, z_m), how far off
-    (standoff_m) and how long it is open (dwell_s). The hidden effects and the bell are the same;
-    teaching, the part's level, the gauge's zero and its noise are drawn anew. Raises ValueError
-    for a change that the shop cannot do.
+    stand: where the gun stands (x_m, y_m, z_m), how far off (standoff_m), how long open (dwell_s).
+    Teaching, level, zero and noise are drawn anew; the hidden effects and the bell are the same.
     """
     rng = stream(seed, 60)
     part, plan = experiment.part, experiment.plan
@@ -78,7 +68,7 @@ def respray(
     bench = Bench(seed, job, sprayed, parcels)
     films = *bench.readings(truths, x, z), bench.readings([], x, z)[0]
     level, offset = 1.0 + LEVEL * rng.normal(), SESSION_UM * rng.normal()
-    return gauged(job, x, z, films, noise, level, offset, rng)
+    return gauged(job, x, z, films, USUAL_NOISE, level, offset, rng)
 
 
 def _longer_open(plan: Plan, part) -> Plan:
@@ -143,7 +133,6 @@ class _Film(Truth):
     """A truth of gravity on the film, as a part sees it that hangs upside down, in its frame."""
 
     def on_film(self, film_um, x, z, scene: Scene, film_at):
-        top = scene.part.height_m
-        return self.drawn['truth'].on_film(
-            film_um, -x, top - z, scene, lambda x, z: film_at(-x, top - z)
-        )
+        truth, top = self.drawn['truth'], scene.part.height_m
+        turned = -x, top - z
+        return truth.on_film(film_um, *turned, scene, lambda x, z: film_at(-x, top - z))

@@ -58,26 +58,15 @@ class Taking:
 
 
 def generate(
-    seed: int,
-    truth: str | list[str] | None = None,
-    *,
-    experiments: tuple[str, ...] = ('door',),
-    readings: int = 100,
-    repeats: int = 25,
-    heldout: int = 60,
-    style: str | None = None,
-    noise: GaugeNoise = USUAL_NOISE,
-    amplitude: float | dict | None = None,
-    scale: float = 1.0,
-    gun: str | None = None,
-    parcels: int = PARCELS,
-    mesh_edge_m: float = 0.012,
+    seed: int, truth: str | list[str] | None = None, *, experiments: tuple[str, ...] = ('door',),
+    readings: int = 100, repeats: int = 25, heldout: int = 60, style: str | None = None,
+    noise: GaugeNoise = USUAL_NOISE, amplitude: float | dict | None = None, scale: float = 1.0,
+    gun: str | None = None, parcels: int = PARCELS, mesh_edge_m: float = 0.012,
     second_brush: float | None = None,
-) -> Campaign:
+) -> Campaign:  # fmt: skip
     """A campaign; the same seed gives the same doors, paths, layout and noise for any truth.
 
-    truth: None, an effect id, 'id~form', 'unknown:...', 'footprint:...' ('*' for any), 'a+b' or a
-        list.
+    truth: None, an effect id, 'id~form', 'unknown:...', 'footprint:...', 'a+b' or a list.
     style: 'columns', 'rows', 'random' or None for any. gun: 'outside', 'near_edge' or None.
     amplitude: instead of typical x U(0.7, 2), in the effect's unit (dict: by id); scale multiplies
     a drawn one. second_brush: every other pass is painted with a brush 2, so many times as wide.
@@ -91,26 +80,16 @@ def generate(
     brushes = {} if second_brush is None else {1: pattern, 2: brush_beside(pattern, second_brush)}
     jobs = [replace(job, plan=replace(job.plan, brushes=tuple(brushes))) for job in jobs]
     taking = Taking(readings, repeats, heldout, style, noise)
-    painted = [
-        _paint(seed, n, job, pattern, truths, taking, parcels, mesh_edge_m, brushes)
-        for n, job in enumerate(jobs)
-    ]
+    how = pattern, truths, taking, parcels, mesh_edge_m, brushes
+    painted = [_paint(seed, number, job, *how) for number, job in enumerate(jobs)]
     return _campaign(seed, pattern, painted, truths, brushes)
 
 
 def panel_study(
-    seed: int,
-    index_m: float = 0.577,
-    *,
-    readings: int = 75,
-    repeats: int = 15,
+    seed: int, index_m: float = 0.577, *, readings: int = 75, repeats: int = 15,
     parcels: int = PARCELS,
-) -> Campaign:
-    """A flat panel, three passes at `index_m`; the bell depends on the seed alone.
-
-    It is a 50 mm bell like the paper's (SB50 near 0.57 m) at about the standoff of the model
-    plane, its speed by mass balance for a mean film of 20 um at 0.577 m.
-    """
+) -> Campaign:  # fmt: skip
+    """A flat panel, three passes of a bell (SB50 near 0.57 m), 20 um of film at 0.577 m."""
     rng = stream(seed, 11)
     pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng), 0.05)
     speed = pattern.K1_cm3_per_s / (20.0 * 0.577)
@@ -136,21 +115,17 @@ class Bench:
         self.plume = conner_plume(pattern, POOL, seed=seed)
         self._clean_landings = {}
         numbers = sorted(set(job.plan.brushes))
-        self._brushes = [
-            Bench(seed + n, job.of_brush(n), brushes[n], parcels // len(numbers)) for n in numbers
-        ]
+        each = parcels // max(len(numbers), 1)
+        self._brushes = [Bench(seed + n, job.of_brush(n), brushes[n], each) for n in numbers]
 
-    def readings(
-        self, truths: list[Truth], x: np.ndarray, z: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def readings(self, truths: list[Truth], x, z) -> tuple[np.ndarray, np.ndarray]:
         """(film, what a noise-free gauge says) at the points, um."""
-        scene = self.scene
         film = self.film_at(truths, x, z)
-        for truth in truths:
-            film = truth.on_film(film, x, z, scene, lambda gx, gz: self.film_at(truths, gx, gz))
+        for t in truths:
+            film = t.on_film(film, x, z, self.scene, lambda gx, gz: self.film_at(truths, gx, gz))
         reading = film
         for truth in truths:
-            reading = truth.on_gauge(reading, x, z, scene)
+            reading = truth.on_gauge(reading, x, z, self.scene)
         return film, reading
 
     def film_at(self, truths: list[Truth], x: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -195,8 +170,7 @@ def _paint(
     style = taking.style or str(rng.choice(['columns', 'rows', 'random']))
     spots = keep_clear(job.part, layout(job.part, style, taking.readings, taking.repeats, rng))
     others = keep_clear(job.part, Spots.at(*scatter(job.part, taking.heldout, rng, 0.015)))
-    at_x = np.concatenate([spots.x_m, others.x_m])
-    at_z = np.concatenate([spots.z_m, others.z_m])
+    at_x, at_z = np.concatenate([spots.x_m, others.x_m]), np.concatenate([spots.z_m, others.z_m])
     bench = Bench(seed, job, pattern, parcels, brushes)
     clean, _ = bench.readings([], at_x, at_z)
     film, expected = bench.readings(truths, at_x, at_z)
@@ -231,10 +205,8 @@ def _campaign(
     brushes: Mapping[int, Pattern],
 ) -> Campaign:  # fmt: skip
     truth = {
-        'seed': seed,
-        'id': '+'.join(t.id for t in truths) or 'clean',
-        'hidden': [t.as_dict() for t in truths],
-        'pattern': asdict(pattern),
+        'seed': seed, 'id': '+'.join(t.id for t in truths) or 'clean',
+        'hidden': [t.as_dict() for t in truths], 'pattern': asdict(pattern),
         'brushes': {number: asdict(each) for number, each in brushes.items()},
-    }
+    }  # fmt: skip
     return Campaign(seed, pattern, tuple(painted), plain(truth))

@@ -1,7 +1,6 @@
 """Causes that are in nobody's library, and bells whose pattern is not Conner's two Gaussians.
 
-Of the first an honest diagnosis must say 'unknown'. The second move the parcels of a Conner plume
-to where the other plume has them, so that the solids are kept; no physics is missing otherwise.
+Of the first a diagnosis must say unknown; the second move parcels, so that the solids are kept.
 """
 
 from __future__ import annotations

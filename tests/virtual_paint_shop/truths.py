@@ -1,8 +1,6 @@
 """What a hidden effect can change, and the register of all of them.
 
-A truth acts on the parcels' way: the plume they leave in, the gun's true motion and flow, the air
-they fly through, whether they stay where they land, what the wet film does, what the gauge says.
-Amplitudes are in the units of the effect's usual parameter; they are drawn as typical x U(0.7, 2).
+Amplitudes are in the units of the effect's usual parameter, drawn as typical x U(0.7, 2).
 An effect may have several laws: classes with one `id` and each its own `form`.
 """
 
@@ -55,9 +53,7 @@ class Truth:
     gun = None  # where the gun must open, so that the effect can occur at all
 
     @classmethod
-    def draw(
-        cls, rng: np.random.Generator, amplitude: float | None = None, scale: float = 1.0
-    ) -> Truth:
+    def draw(cls, rng: np.random.Generator, amplitude: float | None = None, scale=1.0) -> Truth:
         """A truth of physics-typical size, or of the given amplitude."""
         signed = cls.of_size(scale * rng.uniform(0.7, 2.0), rng)
         return cls(signed if amplitude is None else amplitude, cls.details(rng))
@@ -65,9 +61,8 @@ class Truth:
     @classmethod
     def of_size(cls, size: float, rng: np.random.Generator) -> float:
         """The amplitude of so many typical sizes, at the most `most`, with a physical sign."""
-        amount = min(cls.typical * size, cls.most)
-        flip = rng.choice([-1.0, 1.0])
-        return {'positive': amount, 'negative': -amount, 'either': flip * amount}[cls.sign]
+        signs = {'positive': 1.0, 'negative': -1.0, 'either': rng.choice([-1.0, 1.0])}
+        return signs[cls.sign] * min(cls.typical * size, cls.most)
 
     @classmethod
     def name(cls) -> str:
@@ -98,34 +93,23 @@ class Truth:
         """Share of each landing that stays (may exceed 1: paint that would have been lost)."""
         return 1.0
 
-    def on_film(
-        self, film_um: np.ndarray, x: np.ndarray, z: np.ndarray, scene: Scene, film_at: Callable
-    ) -> np.ndarray:
+    def on_film(self, film_um: np.ndarray, x, z, scene: Scene, film_at: Callable) -> np.ndarray:
         """film_at(x, z) -> film of the parcels at any points of the part."""
         return film_um
 
-    def on_gauge(
-        self, film_um: np.ndarray, x: np.ndarray, z: np.ndarray, scene: Scene
-    ) -> np.ndarray:
+    def on_gauge(self, film_um: np.ndarray, x, z, scene: Scene) -> np.ndarray:
         return film_um
 
     def as_dict(self) -> dict:
-        return {
-            'id': self.id,
-            'form': self.form,
-            'family': self.family,
-            'amplitude': float(self.amplitude),
-            'unit': self.unit,
-            **{k: plain(v) for k, v in self.drawn.items()},
-        }
+        kind = {'id': self.id, 'form': self.form, 'family': self.family}
+        amount = {'amplitude': float(self.amplitude), 'unit': self.unit}
+        return kind | amount | plain(self.drawn)
 
 
 def changes_flight(truth: Truth) -> bool:
     """Whether the parcels land elsewhere or in other numbers than in the clean job."""
-    return any(
-        getattr(type(truth), name) is not getattr(Truth, name)
-        for name in ('on_plume', 'on_motion', 'on_flow', 'on_air')
-    )
+    places = ('on_plume', 'on_motion', 'on_flow', 'on_air')
+    return any(getattr(type(truth), place) is not getattr(Truth, place) for place in places)
 
 
 def variant(base: type[Truth], form: str, why: str, **members: object) -> type[Truth]:
@@ -157,20 +141,16 @@ def library() -> dict[str, type[Truth]]:
 
 
 def choose(
-    spec: str | list[str] | None,
-    rng: np.random.Generator,
-    amplitude: float | dict | None = None,
-    scale: float = 1.0,
-) -> list[Truth]:
-    """Truths named by `spec`: None, 'air_drift', 'air_drift+sag~yield', 'unknown:*', a list."""
+    spec: str | list[str] | None, rng: np.random.Generator,
+    amplitude: float | dict | None = None, scale: float = 1.0,
+) -> list[Truth]:  # fmt: skip
+    """Truths named by `spec`: None, 'air_drift', 'air_drift+sag~yield', a list."""
     if spec is None or spec == 'clean':
         return []
     known = library()
     names = spec.split('+') if isinstance(spec, str) else list(spec)
     truths = []
     for name in names:
-        if name.endswith('*'):
-            name = str(rng.choice(sorted(k for k in known if k.startswith(name[:-1]))))
         if name not in known:
             raise ValueError(f'no truth {name!r}; there are: {", ".join(sorted(known))}')
         wanted = amplitude.get(name) if isinstance(amplitude, dict) else amplitude

@@ -11,10 +11,7 @@ SAG_REFERENCE_UM = 20.0
 
 
 class Sag(Truth):
-    """Wet film runs down: flux ~ T^3, integrated in time on a grid (upwind, bottom drains).
-
-    `amplitude` is the volume per width that crosses a horizontal line of 20 um film (um m).
-    """
+    """Wet film runs down: flux ~ T^3 (upwind, bottom drains), um m across a line of 20 um."""
 
     id, family, typical, most, unit = 'sag', 'lateral shift', 0.06, 0.5, 'um m'
     power, yield_um = 3.0, 0.0
@@ -35,20 +32,12 @@ class Sag(Truth):
         return run_down(film_um, dz_m, self.amplitude, self.power, self.yield_um)
 
 
-variant(Sag, 'yield',
-        'Paint with a yield stress: only film above 8 um runs, and then like a thinner one.',
-        yield_um=8.0)  # fmt: skip
-variant(Sag, 'shear_thinning', 'A power-law fluid of index 0.6: flux ~ T^(2 + 1 / 0.6).',
-        power=2.0 + 1.0 / 0.6)  # fmt: skip
+variant(Sag, 'yield', 'A yield stress: only film above 8 um runs.', yield_um=8.0)
+variant(Sag, 'shear_thinning', 'A power-law fluid of index 0.6.', power=2.0 + 1.0 / 0.6)
 
 
-def run_down(
-    film_um: np.ndarray, dz_m: float, volume_um_m: float, power: float = 3.0, yield_um: float = 0.0
-) -> np.ndarray:
-    """Film (columns, heights bottom to top) after running down.
-
-    Only what is thicker than `yield_um` moves: its flux ~ (T - yield)^power.
-    """
+def run_down(film_um: np.ndarray, dz_m: float, volume_um_m: float, power, yield_um) -> np.ndarray:
+    """Film (columns, heights bottom to top) after running down: its flux ~ (T - yield)^power."""
     total = volume_um_m / (SAG_REFERENCE_UM - yield_um) ** power
     moving = np.maximum(film_um - yield_um, 0.0)
     fastest = power * total * moving.max() ** (power - 1.0)
@@ -92,8 +81,7 @@ class FogGradient(Truth):
         return (1.0 - share) ** 1.5
 
 
-variant(FogGradient, 'exponential',
-        "Fog that is used up on its way down from the exhaust's eddy: e-fold over a third.",
+variant(FogGradient, 'exponential', 'Fog that is used up on its way: e-fold over a third.',
         settled=lambda self, share: np.exp(-3.0 * share))  # fmt: skip
 
 
@@ -126,10 +114,7 @@ class GaugeZero(Truth):
 
 
 class GaugeCurvatureBias(Truth):
-    """The probe rocks on convex surface and reads high, low in hollows.
-
-    2a tanh(k / 2), k = -(sum of the principal curvatures over the 5 mm probe) x 250 mm.
-    """
+    """Reads high where convex: 2a tanh(k / 2), k = -(sum of curvatures over 5 mm) x 250 mm."""
 
     id, family, typical, unit = 'gauge_curvature_bias', 'curvature', 1.2, 'um'
     most, probe_m = 6.0, 0.005
@@ -143,10 +128,7 @@ class GaugeCurvatureBias(Truth):
         return -2.0 * np.tanh(0.5 * k)
 
 
-variant(GaugeCurvatureBias, 'linear',
-        'The air gap under a probe of 12 mm grows in proportion to the curvature.',
+variant(GaugeCurvatureBias, 'linear', 'The air gap under a probe of 12 mm: the curvature itself.',
         probe_m=0.012, too_much=lambda k: -k)  # fmt: skip
-variant(GaugeCurvatureBias, 'ridge',
-        'A probe with a guide foot: reads high on ridges, saturating, and little low in hollows.',
-        probe_m=0.008,
+variant(GaugeCurvatureBias, 'ridge', 'A guide foot: high on ridges.', probe_m=0.008,
         too_much=lambda k: np.where(k < 0, -k / (1.0 - 0.3 * k), -0.3 * k))  # fmt: skip

@@ -75,11 +75,7 @@ class PoseLag(Truth):
 
 
 class CornerSlowdown(Truth):
-    """The robot brakes toward each reversal although commanded poses were logged.
-
-    Constant deceleration: v^2 grows linearly with the path s from the reversal over `reach_m`, so
-    the dwell is (1 + a) / sqrt(1 + s/reach ((1 + a)^2 - 1)), a at the reversal and 0 at reach.
-    """
+    """Braking evenly toward each reversal: dwell (1 + a) / sqrt(1 + s/reach ((1 + a)^2 - 1))."""
 
     id, family, typical, unit = 'corner_slowdown', 'boundary', 0.3, '1'
     most, ranges = 2.5, between(reach_m=(0.22, 0.38))
@@ -104,16 +100,11 @@ def _half_cosine(share: np.ndarray, peak: float) -> np.ndarray:
     return _ramp(0.5 * (1.0 - np.cos(np.pi * np.minimum(share, 1.0))), peak)
 
 
-variant(CornerSlowdown, 'exponential',
-        'A servo that lags: the dwell dies away like a relaxation.',
+variant(CornerSlowdown, 'exponential', 'A servo that lags: the dwell dies away exponentially.',
         ranges=between(reach_m=(0.08, 0.18)),
         longer=lambda share, peak: 1.0 + (peak - 1.0) * np.exp(-share))  # fmt: skip
-variant(CornerSlowdown, 'cosine',
-        'A ramp with limited jerk: the speed follows half a cosine.',
-        longer=_half_cosine)  # fmt: skip
-variant(CornerSlowdown, 'ramp',
-        'A path override that lets the speed grow in proportion to the way.',
-        longer=_ramp)  # fmt: skip
+variant(CornerSlowdown, 'cosine', 'Limited jerk: half a cosine.', longer=_half_cosine)
+variant(CornerSlowdown, 'ramp', 'A speed in proportion to the way.', longer=_ramp)
 
 
 class TriggerLag(Truth):
@@ -169,11 +160,7 @@ variant(GunWake, 'even', 'The plume is left behind at an even rate all along its
 
 
 class AirDrift(Truth):
-    """A draught carries the parcels: small droplets more, and ever faster along their flight.
-
-    Displacement = amplitude x mobility x s^1.5, s = share of the way from the bell to the model
-    plane: entrained from rest (power 2) by a jet that slows down (power 1).
-    """
+    """A draught carries small droplets more: amplitude x mobility x (share of the way)^1.5."""
 
     id, family, typical, unit = 'air_drift', 'lateral shift', 0.015, 'm'
     most, growth = 0.12, None
@@ -188,12 +175,8 @@ class AirDrift(Truth):
         return with_drift(air, drift_m, self.growth)
 
 
-variant(AirDrift, 'square',
-        'Droplets still fast: a steady draught displaces them with the square of the way.',
-        growth=2.0)  # fmt: skip
-variant(AirDrift, 'carried',
-        "Droplets at the draught's own speed: displaced in proportion to the way.",
-        growth=1.0)  # fmt: skip
+variant(AirDrift, 'square', 'Droplets that are still fast: the square of the way.', growth=2.0)
+variant(AirDrift, 'carried', "Droplets at the draught's own speed: the way itself.", growth=1.0)
 
 
 class TiltBentBracket(TcpTilt):

@@ -1,7 +1,6 @@
 """Hidden effects where the parcels land: field, bounce, losses on the way, things in between.
 
-Nobody has measured these laws closely. Each further form follows from one of the mechanisms that
-are held to be behind the effect, with the same reference as the effect's first law.
+Further forms follow from a mechanism held to be behind the effect, at the first law's reference.
 """
 
 from __future__ import annotations
@@ -25,11 +24,7 @@ AROUND = np.arange(12) * np.pi / 6
 
 
 class IncidenceAttraction(Truth):
-    """Charged droplets are drawn to surface that turns away (a > 0), or bounce off it (a < 0).
-
-    Gain 1 + a away, bounce 1 / (1 + |a| away); with u = 1/cos - 1 of each parcel's own incidence
-    away = u for a bounce and u / (1 + u / 0.8), saturating, for a gain.
-    """
+    """Gain 1 + a u / (1 + u / 0.8), or bounce 1 / (1 + |a| u); u = 1/cos - 1 of each parcel."""
 
     id, family, typical, most, unit = 'incidence_attraction', 'incidence', 1.0, 6.0, '1'
 
@@ -54,12 +49,9 @@ def _late(cosine, gains):
     return 0.7 * np.maximum(np.arccos(np.minimum(cosine, 1.0)) - np.deg2rad(12.0), 0.0)
 
 
-variant(IncidenceAttraction, 'tangent',
-        "A droplet's sideways momentum counts: tan^2 of the incidence, saturating.",
+variant(IncidenceAttraction, 'tangent', "A droplet's sideways momentum: tan^2, saturating.",
         away=lambda cosine, gains: 0.5 * np.minimum(cosine**-2 - 1.0, 2.5))  # fmt: skip
-variant(IncidenceAttraction, 'late',
-        'Nothing up to 12 degrees, where the field is still along the spray; linear beyond.',
-        away=_late)  # fmt: skip
+variant(IncidenceAttraction, 'late', 'Nothing up to 12 degrees, and linear beyond.', away=_late)
 
 
 class IncidencePower(IncidenceAttraction):
@@ -72,10 +64,7 @@ class IncidencePower(IncidenceAttraction):
 
 
 class ConvexAttraction(Truth):
-    """Field lines crowd on convex lines: gain saturates with curvature over 15 mm.
-
-    1 + a (1 - e^-k) / (1 - e^-1), k = convex curvature x 250 mm, so 1 + a at 250 mm radius.
-    """
+    """1 + a (1 - e^-k) / (1 - e^-1), k = convex curvature over 15 mm x 250 mm."""
 
     id, family, typical, unit = 'convex_attraction', 'curvature', 0.15, '1'
     most, over_m = 1.0, 0.015
@@ -89,11 +78,9 @@ class ConvexAttraction(Truth):
         return (1.0 - np.exp(-k)) / (1.0 - np.exp(-1.0))
 
 
-variant(ConvexAttraction, 'root',
-        'Field of a rounded wedge grows like a root of its curvature.', over_m=0.025,
+variant(ConvexAttraction, 'root', 'A rounded wedge: a root of its curvature.', over_m=0.025,
         gain=lambda k: (np.sqrt(k + 0.02) - np.sqrt(0.02)) / 0.87)  # fmt: skip
-variant(ConvexAttraction, 'cylinder',
-        'Field ~ 1 / radius as on a cylinder, seen over 40 mm; saturates at corona onset.',
+variant(ConvexAttraction, 'cylinder', 'Field ~ 1 / radius over 40 mm, up to the corona.',
         over_m=0.040, gain=lambda k: np.minimum(k, 4.0))  # fmt: skip
 
 
@@ -135,16 +122,11 @@ class _Recess(FaradayShielding):
         return np.exp(-self.amplitude * recess)
 
 
-variant(_Recess, 'depth',
-        'Field lines end on the rims: what counts is the depth below the lower of two rims.',
-        measure=_depth)  # fmt: skip
-variant(_Recess, 'wide',
-        'A field that does not see bends narrower than the space charge before them: 80 mm.',
+variant(_Recess, 'depth', 'Field lines end on the rims: depth below the lower.', measure=_depth)
+variant(_Recess, 'wide', 'A field that does not see bends narrower than the space charge: 80 mm.',
         measure=lambda part, x, z: part.curvature_over(x, z, 0.080)[1] / KAPPA_REF_PER_M,
         )  # fmt: skip
-variant(_Recess, 'sky_view',
-        'Droplets come from every side: the share of the half space that the recess hides.',
-        measure=_hidden_sky)  # fmt: skip
+variant(_Recess, 'sky_view', 'The share of the half space that is hidden.', measure=_hidden_sky)
 
 
 class EdgeBuild(Truth):
@@ -163,22 +145,16 @@ class EdgeBuild(Truth):
         return 1.0 / (1.0 + d**2)
 
 
-variant(EdgeBuild, 'exponential',
-        'The fringe field of an earthed sheet that is near others of its size decays like e^-d.',
+variant(EdgeBuild, 'exponential', 'The fringe field of a sheet near others decays like e^-d.',
         ranges=between(reach_m=(0.01, 0.08)), gain=lambda d: np.exp(-d))  # fmt: skip
-variant(EdgeBuild, 'gaussian',
-        'The sharp field of the edge, blurred by droplets that coast past it.',
+variant(EdgeBuild, 'gaussian', 'The field of the edge, blurred by droplets that coast past it.',
         ranges=between(reach_m=(0.02, 0.06)), gain=lambda d: np.exp(-0.5 * d**2))  # fmt: skip
-variant(EdgeBuild, 'ramp',
-        'A band of even slope, drawn up by surface tension until the film gelled.',
+variant(EdgeBuild, 'ramp', 'A band of even slope, drawn up by surface tension.',
         ranges=between(reach_m=(0.03, 0.12)), gain=lambda d: np.maximum(1.0 - d, 0.0))  # fmt: skip
-variant(EdgeBuild, 'power',
-        'Field at the rim of a thin conducting sheet ~ d^-1/2 (Jackson), blunted by its '
-        'thickness; minus 1/3, so that it ends eight reaches away.',
+variant(EdgeBuild, 'power', 'Field at a rim ~ d^-1/2 (Jackson), blunted; ends eight reaches away.',
         ranges=between(reach_m=(0.01, 0.03)),
         gain=lambda d: np.maximum(1.5 * ((1.0 + d) ** -0.5 - 1.0 / 3.0), 0.0))  # fmt: skip
-variant(EdgeBuild, 'flow',
-        'A fat edge: paint flows to the edge out of a band beside it, and none is lost.',
+variant(EdgeBuild, 'flow', 'A fat edge: paint flows there from beside it, and none is lost.',
         ranges=between(reach_m=(0.01, 0.04)),
         gain=lambda d: (np.exp(-d) - 0.4 * np.exp(-0.4 * d)) / 0.6)  # fmt: skip
 
@@ -196,22 +172,18 @@ class StandoffEfficiency(Truth):
         return np.exp(-a * s)
 
 
-variant(StandoffEfficiency, 'linear',
-        'Transfer efficiency falls linearly with the way, as measured over short ranges.',
+variant(StandoffEfficiency, 'linear', 'Efficiency falls linearly, as measured over short ways.',
         kept=lambda s, a: np.clip(1.0 - a * s, 0.05, 3.0))  # fmt: skip
-variant(StandoffEfficiency, 'power',
-        'Losses of a jet that entrains air and slows down: a power of the way.',
+variant(StandoffEfficiency, 'power', 'A jet that entrains air and slows down: a power of the way.',
         kept=lambda s, a: np.maximum(1.0 + s, 0.3) ** -a)  # fmt: skip
-variant(StandoffEfficiency, 'runaway',
-        'Small droplets are lost at once where the jet ends: losses grow with the square.',
+variant(StandoffEfficiency, 'runaway', 'Small droplets are lost at once where the jet ends.',
         kept=lambda s, a: np.exp(-0.5 * a * (np.maximum(1.0 + s, 0.0) ** 2 - 1.0)),
         )  # fmt: skip
 
 
 class PatternSpread(Truth):
-    """Parcels do not fan out from one point: beside the model plane each keeps its own slope.
+    """Parcels do not fan out from one point: lateral distance q (1 + (1 - b)(z / Omega - 1)).
 
-    Lateral distance = q (1 + (1 - b)(z / Omega - 1)): straight lines from a spread-out source;
     b = amplitude x 0.7 (small droplets) to 1.3 (large); b > 0: shaping air holds them together.
     """
 
@@ -224,32 +196,23 @@ class PatternSpread(Truth):
         return replace(air, narrowing=air.narrowing + narrowing)
 
 
-variant(PatternSpread, 'uniform', 'Shaping air that holds every droplet alike.',
-        by_size=(1.0, 0.0))  # fmt: skip
-variant(PatternSpread, 'small_droplets',
-        'Shaping air that holds the small droplets; large ones fly through it.',
-        by_size=(1.6, -1.2))  # fmt: skip
+variant(PatternSpread, 'uniform', 'Air that holds every droplet alike.', by_size=(1.0, 0.0))
+variant(PatternSpread, 'small_droplets', 'Air that holds small ones most.', by_size=(1.6, -1.2))
 
 
 class Occlusion(Truth):
-    """Something in the part's mesh stands in the parcels' way.
+    """Something in the part's mesh stands in the way from the bell's edge (Embree).
 
-    A ledge along the lower edge or a trim on the surface (stands out by `amplitude`), or a hanger
-    bar in front of the surface (half as wide). Parcels leave the bell's edge; one whose straight
-    way to its landing meets the mesh (Embree) never arrives.
+    A ledge along the lower edge or a trim stands out by `amplitude`; a hanger bar is half as wide.
     """
 
     id, family, typical, most, unit = 'occlusion', 'visibility', 0.06, 0.11, 'm'
 
     @classmethod
     def details(cls, rng):
-        return {
-            'kind': str(rng.choice(['ledge', 'trim', 'bar'], p=[0.1, 0.35, 0.55])),
-            'at': rng.uniform(0.25, 0.75),
-            'from': rng.uniform(0.0, 0.2),
-            'to': rng.uniform(0.75, 1.0),
-            'gap_m': rng.uniform(0.07, 0.12),
-        }
+        kind = {'kind': str(rng.choice(['ledge', 'trim', 'bar'], p=[0.1, 0.35, 0.55]))}
+        limits = {'at': (0.25, 0.75), 'from': (0.0, 0.2), 'to': (0.75, 1.0), 'gap_m': (0.07, 0.12)}
+        return kind | {name: rng.uniform(*ends) for name, ends in limits.items()}
 
     def obstacle(self, part: Part) -> tuple[np.ndarray, np.ndarray]:
         """Vertices and faces of the body: a box section swept along the surface."""
@@ -292,9 +255,7 @@ def _swept(
     return rings.reshape(-1, 3), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def _rise(
-    part: Part, x: np.ndarray, z: np.ndarray, azimuth: float, reach_m: np.ndarray
-) -> np.ndarray:
+def _rise(part: Part, x, z, azimuth: float, reach_m: np.ndarray) -> np.ndarray:
     """(reaches, ...) how far the part rises above the point's tangent plane, 0 beyond its rim."""
     along = reach_m[:, None, None]
     at_x, at_z = x + along * np.cos(azimuth), z + along * np.sin(azimuth)

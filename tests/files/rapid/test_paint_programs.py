@@ -1,7 +1,4 @@
-"""Nine paint programs, each with the poses that it means, worked out by plain arithmetic.
-
-The programs stand in `programs/`; one of them is a folder of three modules.
-"""
+"""Nine paint programs of `programs/`, each with the poses that it means, by plain arithmetic."""
 
 import math
 import shutil
@@ -84,10 +81,7 @@ def styles() -> Poses:
 
 
 def planes() -> Poses:
-    """Brushes that change at planes of a work object that is turned and shifted.
-
-    The work object turns the tool about its own axis, and the target turns it back.
-    """
+    """Brushes change at planes of a work object that turns the tool; the target turns it back."""
     poses = Poses(100, 0).go(100, 100, 500).go(100, 250, 500, 1).go(100, 400, 500, 2)
     return poses.go(100, 600, 500)
 

@@ -20,15 +20,10 @@ from paint_deposition.motion.transforms import Rigid
 
 
 def same(read: pd.Trajectory, written: pd.Trajectory) -> bool:
+    poses, trigger = ('stamps_ns', 'positions_m', 'quaternions_xyzw'), ('stamps_ns', 'flow')
     return read.frame_id == written.frame_id and all(
         np.array_equal(getattr(read, name), getattr(written, name))
-        for name in (
-            'stamps_ns',
-            'positions_m',
-            'quaternions_xyzw',
-            'trigger_stamps_ns',
-            'trigger_flow',
-        )
+        for name in (*poses, *(f'trigger_{name}' for name in trigger))
     )
 
 
@@ -50,12 +45,15 @@ def test_every_storage_and_spelling_of_the_topic(tmp_path, storage):
         assert same(pd.read_recording(path, topic), written)
 
 
-def test_a_topic_without_poses_is_no_candidate(tmp_path):
-    written = straight_pass(triggers=False)
+def test_topics_of_other_types_and_without_messages_are_no_candidates(tmp_path):
+    """rosbags cannot parse the events' type; only the types that are read have to be parsed."""
+    written, messages = straight_pass(triggers=False), Messages()
+    event = Definition('MSG: example_interfaces/srv/AddTwoInts_Event\nint64 a\n---\nint64 sum\n')
     with RunWriter(tmp_path / 'run') as run:
+        run.add_topic(RunTopic('/add/_service_event', 'example_interfaces/srv/Add_Event', event))
+        run.write('/add/_service_event', b'\0\1\0\0', START_NS, START_NS)
         for topic in ('/empty', '/p'):
             run.add_topic(RunTopic(topic, POSE, standard(POSE)))
-        messages = Messages()
         for topic, stamp, message in pose_entries(written, '/p'):
             run.write(topic, bytes(messages.serialised(message)), stamp, stamp)
     assert same(pd.read_recording(tmp_path / 'run'), written)
@@ -64,14 +62,11 @@ def test_a_topic_without_poses_is_no_candidate(tmp_path):
 def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     written, messages = straight_pass(triggers=False), Messages()
     entries = pose_entries(written, delay_ns=3_000_000)
-    entries += [('/gun', START_NS + 700, messages.trigger(True))]
-    entries += [('/gun', START_NS + 900, messages.trigger(False))]
+    entries += [('/gun', START_NS + at, messages.trigger(at == 700)) for at in (700, 900)]
     # Logged late: only its own stamp says when the flow changed.
-    entries += [('/state', START_NS + 5_000, messages.state(START_NS + 70, True, 0.8, 60.0))]
-    entries += [('/state', START_NS + 5_001, messages.state(START_NS + 90, False, 0.8))]
-    entries += [
-        ('/state', START_NS + 5_002, messages.state(START_NS + 95, True, float('nan'), 64.0))
-    ]
+    states = [(70, True, 0.8, 60.0), (90, False, 0.8), (95, True, np.nan, 64.0)]
+    for k, (at, *state) in enumerate(states):
+        entries.append(('/state', START_NS + 5_000 + k, messages.state(START_NS + at, *state)))
     folder = write_bag(tmp_path / 'two_triggers', sorted(entries, key=lambda entry: entry[1]))
     gun = pd.read_recording(folder, None, 'gun')
     assert gun.trigger_stamps_ns.tolist() == [START_NS + 700, START_NS + 900]
@@ -120,13 +115,16 @@ def test_a_state_that_sprays_with_flow_0_is_noted(tmp_path):
     assert 'trigger /state says spraying with flow 0, which lays no paint' in recorded.notes[0]
 
 
-def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
+def test_poses_without_stamps_and_a_bool_on_another_clock_are_refused(tmp_path):
     written, hour_ns = straight_pass(triggers=False), 3_600 * 10**9
     entries = pose_entries(written, delay_ns=hour_ns)
     entries += [('/gun', START_NS + hour_ns, Messages().trigger(True))]
     folder = write_bag(tmp_path / 'other_clock', sorted(entries, key=lambda entry: entry[1]))
     assert len(pd.read_recording(folder)) == len(written)
     assert '3.6e+03 s off its own stamps' in refusal(folder, None, '/gun')
+    messages = Messages()
+    entries = [('/p', START_NS + k, messages.pose(0, (0, 0, 0), (0, 0, 0, 1))) for k in range(3)]
+    assert 'all 3 poses on /p' in refusal(write_bag(tmp_path / 'unstamped', entries))
 
 
 @pytest.mark.parametrize(
@@ -145,20 +143,6 @@ def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
 )
 def test_what_real_bags_do_not_have(shared_data, bag, arguments, says):
     assert re.search(says, refusal(shared_data / 'bags' / bag, *arguments))
-
-
-def test_poses_beside_service_events_are_read(tmp_path):
-    """rosbags cannot parse the events' type; only the types that are read have to be parsed."""
-    written = straight_pass(triggers=False)
-    folder = write_pose_bag(tmp_path / 'pass', written)
-    event = Definition('MSG: example_interfaces/srv/AddTwoInts_Event\nint64 a\n---\nint64 sum\n')
-    with open_bag(folder) as bag, RunWriter(tmp_path / 'mixed') as run:
-        run.add_topic(RunTopic('/add/_service_event', 'example_interfaces/srv/Add_Event', event))
-        run.add_topic(RunTopic('/p', POSE, standard(POSE)))
-        run.write('/add/_service_event', b'\0\1\0\0', START_NS, START_NS)
-        for message in bag.messages():
-            run.write('/p', message.cdr, message.log_time_ns, message.log_time_ns)
-    assert same(pd.read_recording(tmp_path / 'mixed'), written)
 
 
 def test_messages_that_nodes_leave_out_are_left_out_counted_and_refused_if_strict(tmp_path):
@@ -206,17 +190,10 @@ def test_poses_of_several_frames_are_brought_to_the_part(tmp_path):
     for row, frame in poses:
         pose = messages.pose(written.stamps_ns[row], seen[0][row], seen[1][row], frame)
         entries[row] = (*entries[row][:2], pose)
-    read = pd.read_recording(
-        write_bag(tmp_path / 'few', [('/tf_static', START_NS, static), *entries])
-    )
+    few = write_bag(tmp_path / 'few', [('/tf_static', START_NS, static), *entries])
+    read = pd.read_recording(few)
     assert read.stamps_ns.tolist() == written.stamps_ns[[0, 19]].tolist()
     assert np.allclose(read.positions_m, written.positions_m[[0, 19]], atol=1e-12)
-
-
-def test_poses_without_stamps_are_refused(tmp_path):
-    messages = Messages()
-    entries = [('/p', START_NS + k, messages.pose(0, (0, 0, 0), (0, 0, 0, 1))) for k in range(3)]
-    assert 'all 3 poses on /p' in refusal(write_bag(tmp_path / 'unstamped', entries))
 
 
 def test_an_unfinished_file_says_how_to_recover_it(tmp_path):
@@ -235,9 +212,8 @@ def test_a_part_of_a_split_bag_is_not_taken_for_the_whole(tmp_path):
     """A recorder that is killed has not named its last file; a single file may be named."""
     folder = write_pose_bag(tmp_path / 'pass', straight_pass(500))
     shutil.copy(folder / 'pass_0.mcap', folder / 'pass_1.mcap')
-    assert refusal(folder).endswith(
-        f'metadata.yaml does not name pass_1.mcap); run: paint recover {folder}'
-    )
+    said = f'metadata.yaml does not name pass_1.mcap); run: paint recover {folder}'
+    assert refusal(folder).endswith(said)
     metadata = folder / 'metadata.yaml'
     both = re.sub(r'(\s*- )pass_0.mcap', r'\1pass_0.mcap\1pass_1.mcap', metadata.read_text())
     metadata.write_text(both)
@@ -256,14 +232,11 @@ def test_a_file_has_the_custom_data_of_its_folder_alone(tmp_path):
     assert (len(other), len(other.trigger_flow)) == (50, 0)
 
 
-def test_damaged_metadata_beside_a_file_is_no_traceback(tmp_path):
+def test_damaged_metadata_and_other_files_under_a_bags_name_are_no_traceback(tmp_path):
     told = {'messages_of_the_part': '/atomizer/pose=seven'}
     folder = write_pose_bag(tmp_path / 'run', straight_pass(5), told)
     assert 'run_0.mcap is damaged (invalid literal' in refusal(folder / 'run_0.mcap')
-
-
-def test_other_files_under_a_bags_name(tmp_path):
-    """A cut ROS 1 bag is damaged likewise."""
+    # A cut ROS 1 bag is damaged likewise.
     for name in ('a.mcap', 'a.db3', 'a.bag'):
         path = tmp_path / name
         path.write_bytes(b'x' * 1000)

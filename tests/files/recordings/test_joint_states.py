@@ -23,19 +23,18 @@ TIMES_S = np.linspace(0.0, 3.0, 151)
 def joint_bag(path, rows, storage='mcap'):
     """A bag of (topic, stamp, names, positions) of joint states."""
     messages = Messages(ros1=storage == 'ros1')
-    entries = [
-        (topic, int(stamp), messages.joints(stamp, names, values))
-        for topic, stamp, names, values in rows
-    ]
+    entries = [(topic, int(stamp), messages.joints(stamp, *told)) for topic, stamp, *told in rows]
     return write_bag(path, entries, storage, messages)
 
 
 def rows_of(joints=None, names=JOINTS):
-    joints = sweep() if joints is None else joints
-    return [
-        ('/joint_states', stamp, names, row)
-        for stamp, row in zip(stamps_ns(TIMES_S), joints, strict=True)
-    ]
+    each = zip(stamps_ns(TIMES_S), sweep() if joints is None else joints, strict=True)
+    return [('/joint_states', stamp, names, row) for stamp, row in each]
+
+
+def read_joints(folder, rows):
+    """The motion of the arm's tip by these joint states."""
+    return read_recording(joint_bag(folder / 'run', rows), urdf=str(URDF), frame_id='base_link')
 
 
 def test_any_joints_agree_with_the_product_of_exponentials():
@@ -69,10 +68,14 @@ def test_joints_in_any_order_and_in_messages_of_their_own(tmp_path):
         rows.append(('/joint_states', stamp, others, [*values[:0:-1], 0.4]))
         if row % 2 == 0:
             rows.append(('/joint_states', stamp, ('shoulder_pan',), values[:1]))
-    bag = joint_bag(tmp_path / 'run', rows)
-    read = read_recording(bag, '/joint_states', urdf=str(URDF), frame_id='base_link')
     # The pan is even in time, so that what is interpolated is exact.
+    assert np.allclose(read_joints(tmp_path, rows).positions_m, tip_poses(joints)[0], atol=1e-9)
+    # Another order from some message on.
+    rows = rows_of()
+    rows[70:] = [(*row[:2], JOINTS[::-1], row[3][::-1]) for row in rows[70:]]
+    read = read_joints(tmp_path / 'again', rows)
     assert np.allclose(read.positions_m, tip_poses(joints)[0], atol=1e-9)
+    assert read.warnings == ()
 
 
 def test_another_link_and_another_base(tmp_path):
@@ -105,10 +108,13 @@ def test_missing_links_and_joints_are_named(given, words, tmp_path):
     assert words in str(refused.value)
 
 
-def test_joints_that_are_not_recorded_are_named(tmp_path):
-    bag = joint_bag(tmp_path / 'run', rows_of(sweep()[:, :5], JOINTS[:5]))
+def test_joints_that_are_not_recorded_or_never_known_together_are_named(tmp_path):
     with pytest.raises(RecordingError, match=r'has nothing of wrist_roll of arm\.urdf'):
-        read_recording(bag, urdf=str(URDF))
+        read_joints(tmp_path / 'few', rows_of(sweep()[:, :5], JOINTS[:5]))
+    rows = [('/arm', stamp, JOINTS[1:], joints[1:]) for _, stamp, _, joints in rows_of()[:70]]
+    rows += [('/pan', stamp, JOINTS[:1], joints[:1]) for _, stamp, _, joints in rows_of()[80:]]
+    with pytest.raises(RecordingError, match=r'elbow on /arm until .*, shoulder_pan on /pan'):
+        read_joints(tmp_path, rows)
 
 
 ONE_JOINT = (
@@ -137,44 +143,22 @@ def test_what_is_no_robot_is_refused(text, words, tmp_path):
         _ = Robot.read(tmp_path / 'robot.urdf', tip='tool0').arm
 
 
-def test_joint_states_that_are_not_finite_are_left_out_and_counted(tmp_path):
-    rows = rows_of()
-    rows[20] = (*rows[20][:3], np.full(6, np.nan))
-    read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(URDF), frame_id='base_link')
-    assert len(read) == len(rows) - 1
-    assert np.isfinite(read.positions_m).all()
-    assert '1 joint states on /joint_states with joints that are not finite' in ' '.join(
-        read.warnings
-    )
-
-
-def test_joints_are_known_in_whatever_order_they_are_named(tmp_path):
-    rows = rows_of()
-    rows[70:] = [(*row[:2], JOINTS[::-1], row[3][::-1]) for row in rows[70:]]
-    read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(URDF), frame_id='base_link')
-    assert np.allclose(read.positions_m, tip_poses(sweep())[0], atol=1e-9)
-    assert read.warnings == ()
-
-
 def test_joint_states_that_are_not_used_are_counted(tmp_path):
     rows = rows_of()
+    rows[10] = (*rows[10][:3], np.full(6, np.nan))
     rows[20] = (*rows[20][:3], [])
     rows[30] = ('/joint_states', rows[29][1], *rows[30][2:])
     rows[140:] = [(*row[:2], (*JOINTS, 'gripper'), [*row[3], 0.1]) for row in rows[140:]]
-    read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(URDF), frame_id='base_link')
-    assert len(read) == 138
-    assert [warning.split(': ', 1)[1] for warning in read.warnings] == [
-        '1 joint states on /joint_states without a position for each joint: left out',
-        '1 joint states on /joint_states stamped no later than one before: left out',
-        '11 joint states on /joint_states with another set of joints than most: left out',
-    ]
-
-
-def test_joints_that_are_never_known_together_are_named(tmp_path):
-    rows = [('/arm', stamp, JOINTS[1:], joints[1:]) for _, stamp, _, joints in rows_of()[:70]]
-    rows += [('/pan', stamp, JOINTS[:1], joints[:1]) for _, stamp, _, joints in rows_of()[80:]]
-    with pytest.raises(RecordingError, match=r'elbow on /arm until .*, shoulder_pan on /pan'):
-        read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(URDF))
+    read = read_joints(tmp_path, rows)
+    assert len(read) == 137
+    assert np.isfinite(read.positions_m).all()
+    told = [warning.split(' joint states on /joint_states ', 1) for warning in read.warnings]
+    assert {why: count.split(': ')[-1] for count, why in told} == {
+        'with joints that are not finite: left out': '1',
+        'without a position for each joint: left out': '1',
+        'stamped no later than one before: left out': '1',
+        'with another set of joints than most: left out': '11',
+    }
 
 
 def logged_twice(messages, topic):
@@ -315,10 +299,7 @@ RAIL = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]
 
 
 def tf_bag(path, storage='mcap'):
-    """A rail that carries an arm with a bell: world -> rail -> tool0 -> bell.
-
-    The rail goes evenly at 0.1 m/s and is published at 5 Hz, the arm at 50 Hz, the bell is static.
-    """
+    """A rail (0.1 m/s, 5 Hz) with an arm (50 Hz) and a bell: world -> rail -> tool0 -> bell."""
     messages = Messages(ros1=storage == 'ros1')
     positions, quaternions = tip_poses(sweep())
     stamps = stamps_ns(TIMES_S)

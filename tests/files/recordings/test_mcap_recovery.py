@@ -73,15 +73,17 @@ def test_a_cut_run_becomes_a_whole_one(tmp_path, cut_run, given):
     assert information['custom_data'] == {'mesh': 'door.stl'}
     assert information['ros_distro'] == 'jazzy'
     metadata = information['topics_with_message_count'][0]['topic_metadata']
-    assert [qos['depth'] for qos in metadata['offered_qos_profiles']] == [1, 7]
-    assert metadata['offered_qos_profiles'][0]['durability'] == 'transient_local'
-    assert metadata['offered_qos_profiles'][1]['reliability'] == 'best_effort'
+    latched, other = metadata['offered_qos_profiles']
+    assert (latched['depth'], latched['durability']) == (1, 'transient_local')
+    assert (other['depth'], other['reliability']) == (7, 'best_effort')
     assert metadata['type_description_hash'] == standard(BOOL).type_hash
 
 
+NESTED = '{a: ' * 600 + '1' + '}' * 600
+
+
 @pytest.mark.parametrize(
-    'told',
-    ['a: 2024-13-45', '{a: ' * 600 + '1' + '}' * 600, 'custom_data: [1]', 'a: &a [*a]', '- 1'],
+    'told', ['a: 2024-13-45', NESTED, 'custom_data: [1]', 'a: &a [*a]', '- 1']
 )
 def test_odd_metadata_in_a_file_do_not_keep_it_from_being_recovered(tmp_path, told):
     with RunWriter(tmp_path / 'run') as run:
@@ -94,17 +96,15 @@ def test_odd_metadata_in_a_file_do_not_keep_it_from_being_recovered(tmp_path, to
 
 def gun_file(path, count, chunk_bytes, compression='zstd'):
     """A file of so many triggers, 1000 ns apart, and its chunks."""
-    rng, text = np.random.default_rng(8), standard(BOOL).text.encode()
+    on, text = np.random.default_rng(8).integers(2, size=count), standard(BOOL).text.encode()
     with path.open('wb') as stream:
         kind = CompressionType[compression.upper()]
         writer = Writer(stream, chunk_size=chunk_bytes, compression=kind)
         writer.start(profile='ros2')
         schema = writer.register_schema(BOOL, 'ros2msg', text)
         channel = writer.register_channel('/gun', 'cdr', schema)
-        for stamp in range(0, 1000 * count, 1000):
-            writer.add_message(
-                channel, stamp, b'\0\1\0\0' + bytes(rng.integers(2, size=1, dtype='u1')), stamp
-            )
+        for row, flag in enumerate(on.tolist()):
+            writer.add_message(channel, 1000 * row, b'\0\1\0\0' + bytes([flag]), 1000 * row)
         writer.finish()
     with path.open('rb') as stream:
         return make_reader(stream).get_summary().chunk_indexes
@@ -124,9 +124,9 @@ def test_the_beginning_of_a_cut_chunk_is_read(tmp_path, compression):
 
 def test_a_file_cut_at_any_byte_gives_back_all_its_whole_chunks(tmp_path):
     """The power goes; no more comes back either than there was, up to the next chunk's end."""
-    chunks = gun_file(tmp_path / 'run.mcap', 300, 1400)
     ends = [
-        (c.chunk_start_offset + c.chunk_length, c.message_end_time // 1000 + 1) for c in chunks
+        (chunk.chunk_start_offset + chunk.chunk_length, chunk.message_end_time // 1000 + 1)
+        for chunk in gun_file(tmp_path / 'run.mcap', 300, 1400)
     ]
     assert len(ends) > 6
     content = (tmp_path / 'run.mcap').read_bytes()

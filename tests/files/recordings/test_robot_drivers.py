@@ -73,11 +73,8 @@ def poses(topic, kind, scale=1.0, frame_id='base_link'):
 
 def bag(path, *streams):
     messages = Messages()
-    entries = [
-        (topic, stamp + LAG_NS, message)
-        for stream in streams
-        for topic, stamp, message in stream(messages)
-    ]
+    rows = (row for stream in streams for row in stream(messages))
+    entries = [(topic, stamp + LAG_NS, message) for topic, stamp, message in rows]
     return write_bag(path, sorted(entries, key=lambda entry: entry[1]), 'mcap', messages)
 
 
@@ -110,9 +107,8 @@ def table(path, columns):
 
 EGM = joints('/egm/joint_states', ABB_JOINTS, SWEEP)
 PREFIXED = joints('/egm/joint_states', [f'irb_{name}' for name in ABB_JOINTS], SWEEP)
-DEGREES = joints(
-    '/arm_JointState', [name.replace('_', '') for name in ABB_JOINTS], np.degrees(SWEEP)
-)
+UNSCORED = [name.replace('_', '') for name in ABB_JOINTS]
+DEGREES = joints('/arm_JointState', UNSCORED, np.degrees(SWEEP))
 RAIL = joints('/rail/joint_states', ['rail'], RAIL_M[:, None], every=2)
 RAIL_MM = joints('/rail/joint_states', ['rail'], 1e3 * RAIL_M[:, None], every=2)
 MILLIMETRES = poses('/arm_PoseStamped', 'PoseStamped', 1e3, '')
@@ -124,9 +120,7 @@ DRIVERS = {
     'degrees': ((DEGREES,), {'urdf': 'arm', 'angle_unit': 'deg'}, 'give --angle-unit deg'),
     'rail': ((EGM, RAIL), {'urdf': 'railed'}, 'give urdf'),
     'rail in mm': ((EGM, RAIL_MM), {'urdf': 'railed', 'pose_unit': 'mm'}, ''),
-    'named topics': (
-        BOTH, {'urdf': 'arm', 'pose_topic': '/egm/joint_states'}, '--pose-topic /egm/joint_states',
-    ),
+    'named topics': (BOTH, {'urdf': 'arm', 'pose_topic': '/egm/joint_states'}, '--pose-topic'),
     'millimetres': ((MILLIMETRES,), {'pose_unit': 'mm'}, ''),
     'odometry': ((poses('/odom', 'Odometry'),), {}, ''),
     'covariance': ((poses('/pose', 'PoseWithCovarianceStamped'),), {}, ''),
@@ -134,9 +128,7 @@ DRIVERS = {
     'array': ((poses('/poses', 'PoseArray'),), {'pose_topic': '/poses[1]'}, 'as /poses[0]'),
     'abb_libegm': (egm_log, {}, ''),
     'abb_libegm joints': (egm_log, {'urdf': 'arm'}, ''),
-    'abb_motion_program_exec': (
-        program_log, {'urdf': 'arm', 'angle_unit': 'deg'}, 'give --angle-unit deg'
-    ),
+    'abb_motion_program_exec': (program_log, {'urdf': 'arm', 'angle_unit': 'deg'}, '--angle-unit'),
 }  # fmt: skip
 
 
@@ -162,17 +154,13 @@ def test_each_driver_gives_the_motion_of_the_arm(driver, tmp_path):
 @pytest.mark.parametrize(
     ('stream', 'words'),
     [
-        (
-            joints('/rws', ABB_JOINTS, SWEEP, every=50),
-            '/rws: only 5 samples a second: .* 20 cm at 1 m/s, .* polling_rate',
-        ),
-        (
-            joints('/rws', ABB_JOINTS, SWEEP, times=3),
-            '/rws: 480 of 751 samples repeat .* dropped, and 83.3 a second',
-        ),
+        (joints('/rws', ABB_JOINTS, SWEEP, every=50),
+         '/rws: only 5 samples a second: .* 20 cm at 1 m/s, .* polling_rate'),
+        (joints('/rws', ABB_JOINTS, SWEEP, times=3),
+         '/rws: 480 of 751 samples repeat .* dropped, and 83.3 a second'),
         (MILLIMETRES, '/arm_PoseStamped: its positions reach 1277 .* give --pose-unit mm'),
     ],
-)
+)  # fmt: skip
 def test_what_was_taken_in_silence_is_told(stream, words, tmp_path):
     given = {} if stream is MILLIMETRES else {'urdf': str(ROBOTS / 'arm.urdf')}
     read = pd.read_recording(bag(tmp_path / 'run', stream), **given)

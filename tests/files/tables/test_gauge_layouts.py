@@ -1,8 +1,4 @@
-"""Files as gauges, robots and spreadsheets write them.
-
-The layouts follow what the makers' manuals and programs show: lines about the batch, a table with
-units in its headings or in a column of its own, and the statistics of the batch below it.
-"""
+"""Tables of readings in any layout: what is read of which points, and what is refused."""
 
 from pathlib import Path
 
@@ -14,56 +10,10 @@ from paint_deposition.files.gauge_readings import read_readings, write_predictio
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.part.surface import Surface
 from surfaces import triangulated
-from workbook import open_document, open_row, write_workbook
+from workbook import write_workbook
 
 LAYOUTS = Path(__file__).with_name('layouts')
-POINTS_M = np.array([[0.1, 0.0, 0.05], [0.1, 0.0, 0.2], [0.25, 0.0, 0.35]])
-
 POINTS = (LAYOUTS / 'points.csv').read_text()
-
-
-def require_the_four_readings(readings, within_um=1e-9):
-    """All layouts hold the same four readings at the same three points."""
-    assert readings.thickness_um == pytest.approx([21.5, 22.1, 24.0, 19.4], abs=within_um)
-    assert readings.point.tolist() == ['A1', 'A1', 'A2', 'A3']
-    assert readings.positions_m == pytest.approx(POINTS_M[[0, 0, 1, 2]], abs=1e-12)
-
-
-# Files in `layouts/`, and what is said of each: a unit in a column of its own and statistics
-# behind their names; German Windows, with repeats side by side; the summary before the readings
-# and labels of points in the notes; a robot's list aligned by blanks, nominal places and measured.
-MAKERS = {
-    'elcometer': "elcometer.txt: 4 readings, commas, UTF-8; x, y, z in mm, thickness in µm from "
-    "'Reading'; left out: 1 row without a reading, 7 rows of statistics",
-    'fischer': 'tabs, cp1252, decimal comma; x, y, z in mm, thickness in µm from',
-    'positector': 'of 3 points in points.csv (semicolons, UTF-8, decimal comma), joined by '
-    "'Point', thickness in mil from 'Thickness'",
-    'robot': 'blanks, UTF-16; x, y, z in mm (no unit is given; the largest is 350), '
-    "thickness in µm (no unit is given) from 'DFT'",
-}  # fmt: skip
-
-
-@pytest.mark.parametrize('maker', MAKERS)
-def test_layouts_of_makers(maker):
-    points = LAYOUTS / 'points.csv' if maker == 'positector' else None
-    readings = read_readings(LAYOUTS / f'{maker}.txt', points)
-    require_the_four_readings(readings, 2e-3 if points else 1e-9)
-    assert MAKERS[maker] in readings.understood
-
-
-def test_predictions_are_written_beside_the_columns_of_the_file(tmp_path):
-    written, readings = tmp_path / 'predicted.csv', read_readings(LAYOUTS / 'fischer.txt')
-    write_predictions(written, readings, np.array([1.0, 1.0, 2.0, 3.0]))
-    lines = written.read_text().splitlines()
-    assert lines[1] == 'A1,100.0,0.0,50.0,21.5,22.1,1.0000'
-    assert len(lines) == 4
-
-
-def test_labels_that_look_like_comments_are_counted(file):
-    rows = '#1,0,0,0,20\n# of the left door\n#2,1,0,0,21\n3,2,0,0,22\n'
-    readings = read_readings(file('a.csv', f'point,x_m,y_m,z_m,thickness_um\n{rows}'))
-    assert readings.point.tolist() == ['3']
-    assert 'left out: 2 rows that begin with #' in readings.understood
 
 
 def test_layers_side_by_side_are_predicted_each(file, tmp_path):
@@ -76,46 +26,13 @@ def test_layers_side_by_side_are_predicted_each(file, tmp_path):
     assert lines[1:] == ['"A,1",0,0,0,15.5,40,15.0000,42.0000', 'B,1,0,0,,41,,43.0000']
 
 
-def test_spreadsheet(tmp_path):
-    """Title rows, numbers as numbers and as text with a comma, a second sheet without readings."""
-    rows = [
-        ['Türaußenhaut, Los 17'],
-        [],
-        [None, 'Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke (µm)', 'i.O.?'],
-        [None, 'A1', 100, 0, 50, 21.5, 'ja'],
-        [None, 'A1', 100, 0, 50, '22,1', 'ja'],
-        [None, 'A2', 100, 0, 200, 24, 'ja'],
-        [None, 'A3', 250, 0, 350, '19,4', 'nein'],
-        [None, 'Mittelwert', None, None, None, 21.75],
-    ]
-    path = tmp_path / 'tuer.xlsx'
-    write_workbook(path, {'Deckblatt': [['Kunde', 'Werk 3']], 'Messung': rows})
-    readings = read_readings(path)
-    require_the_four_readings(readings)
-    assert "sheet 'Messung'" in readings.understood
-    twice = tmp_path / 'twice.xlsx'
-    write_workbook(twice, {'left': rows, 'right': rows})
-    with pytest.raises(ReadingsError, match="tables in sheet 'left' and sheet 'right'; name one"):
-        read_readings(twice)
-    require_the_four_readings(read_readings(twice, layout=Layout(sheet='right')))
+def listing(labels: str) -> str:
+    """A list of these points, 0.1 m apart along x."""
+    rows = (f'{label},0.{k},0,0\n' for k, label in enumerate(labels.split(), start=1))
+    return 'no,x_m,y_m,z_m\n' + ''.join(rows)
 
 
-def test_open_document_whose_empty_rest_is_said_to_repeat(tmp_path):
-    """As LibreOffice writes it: empty cells and rows to the end of the sheet."""
-    rows = [
-        ('Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke [µm]'),
-        ('A1', 100.0, 0.0, 50.0, 21.5),
-        ('A1', 100.0, 0.0, 50.0, 22.1),
-        ('A2', 100.0, 0.0, 200.0, 24.0),
-        ('A3', 250.0, 0.0, 350.0, 19.4),
-    ]
-    rest = open_row(rows=1_048_571, empty=16_384)
-    path = tmp_path / 'tuer.ods'
-    path.write_bytes(open_document(''.join(open_row(*row, empty=16_379) for row in rows) + rest))
-    require_the_four_readings(read_readings(path))
-
-
-IN_ORDER = 'no,x_m,y_m,z_m\n' + ''.join(f'{k},0.{k},0,0\n' for k in range(1, 7))
+IN_ORDER = listing('1 2 3 4 5 6')
 
 
 @pytest.mark.parametrize(
@@ -130,7 +47,7 @@ IN_ORDER = 'no,x_m,y_m,z_m\n' + ''.join(f'{k},0.{k},0,0\n' for k in range(1, 7))
 )  # fmt: skip
 @pytest.mark.parametrize('names', ['{}', 'P00{}'])
 def test_a_missing_reading_keeps_its_number(file, text, measured, names):
-    listed = 'no,x_m,y_m,z_m\n' + ''.join(f'{names.format(k)},0.{k},0,0\n' for k in range(1, 7))
+    listed = listing(' '.join(names.format(k) for k in range(1, 7)))
     path, points = file('b.csv', text), file('points.csv', listed)
     if names != '{}' and '2,21\n4' in text:
         # A gauge's count with a gap is no order: it may have left out any point.
@@ -172,9 +89,7 @@ def test_a_lone_heading_keeps_its_unit(file, heading, mark):
     ],
 )
 def test_readings_in_order_are_refused_if_their_number_is_not_that_of_the_points(file, text):
-    with pytest.raises(
-        ReadingsError, match=r'readings in order for the 6 points .*; write n/a in'
-    ):
+    with pytest.raises(ReadingsError, match=r'readings in order for the 6 points .*write n/a'):
         read_readings(file('b.csv', text), file('points.csv', IN_ORDER))
 
 
@@ -288,11 +203,8 @@ def test_decimal_commas_cut_by_the_commas_between_columns_are_warned_of(file):
 
 def test_columns_unit_and_decimals_can_be_named(file):
     path = file('a.csv', 'a;b;c;clear;base\n1,000;2;3;4,000;9\n')
-    layout = Layout(
-        columns={'x': 'a', 'y': 'b', 'z': 3, 'thickness': 'clear'},
-        unit={'position': 0.0254, 'thickness': 25.4e-6},
-        decimal=',',
-    )
+    columns = {'x': 'a', 'y': 'b', 'z': 3, 'thickness': 'clear'}
+    layout = Layout(columns, {'position': 0.0254, 'thickness': 25.4e-6}, decimal=',')
     readings = read_readings(path, layout=layout)
     assert readings.positions_m[0] == pytest.approx([0.0254, 0.0508, 0.0762], abs=1e-12)
     assert readings.thickness_um == pytest.approx([101.6])
@@ -311,34 +223,48 @@ def test_places_on_a_face_are_found_as_the_gun_sees_it(file):
     panel = Surface.from_triangles(*sheet, max_edge_length_m=0.1)
     path = file('a.csv', 'Point;from left [mm];height [mm];DFT [µm]\nA;100;50;20\nB;580;390;21\n')
     readings = read_readings(path, surface=panel)
-    low = np.array([-0.3, 0.0, -0.2])
-    assert readings.positions_m == pytest.approx(
-        low + np.array([[0.1, 0.0, 0.05], [0.58, 0.0, 0.39]]), abs=1e-6
-    )
+    expected = np.array([[-0.2, 0.0, -0.15], [0.28, 0.0, 0.19]])
+    assert readings.positions_m == pytest.approx(expected, abs=1e-6)
     beside = file('b.csv', 'from left [mm];height [mm];DFT [µm]\n610;50;20\n')
     with pytest.raises(ReadingsError, match=r'line 2: 0\.610 m from the left .* is no surface'):
         read_readings(beside, surface=panel)
-    with pytest.raises(
-        ReadingsError, match=r'are places on a face; .*name the file in a campaign'
-    ):
+    with pytest.raises(ReadingsError, match=r'are places on a face; .*name the file in a camp'):
         read_readings(path)
 
 
-def test_rows_with_coordinates_are_points_whatever_their_labels(file):
-    """Compass points and letters beside statistics are no statistics where they have a place."""
-    labels = ['E', 'N', 'W', 'S', 'R', 'X', 'V']
-    rows = [f'{label};{k};0;1;{20 + k}' for k, label in enumerate(labels)]
-    text = '\n'.join(['Punkt;x [m];y [m];z [m];DFT [µm]', *rows, 'Mean;;;;23', 's;;;;2', 'n;;;;7'])
-    readings = read_readings(file('a.csv', text))
-    assert readings.point.tolist() == labels
-    assert '3 rows of statistics' in readings.understood
+PLACED = 'Punkt;x [m];y [m];z [m];DFT [µm]\n'
+COUNTED = 'Nr;x_mm;y_mm;z_mm;DFT\n7;100;0;50;21\n3;100;0;200;22\n'
+COMPASS = ''.join(f'{label};{k};0;1;2{k}\n' for k, label in enumerate('ENWSRXV'))
 
 
-def test_labels_of_listed_points_are_no_statistics(file):
-    listed = file('points.csv', 'point,x_m,y_m,z_m\n' + 'N,0,0,0\nS,1,0,0\nX,2,0,0\n')
-    text = 'point,DFT\nN,20\nS,21\nX,22\nMean,21\nn,3\n'
-    readings = read_readings(file('a.csv', text), listed)
-    assert readings.point.tolist() == ['N', 'S', 'X']
+@pytest.mark.parametrize(
+    ('text', 'listed', 'columns', 'labels', 'said'),
+    [
+        ('point,x_m,y_m,z_m,DFT\n#1,0,0,0,20\n# of the left door\n#2,1,0,0,21\n3,2,0,0,22\n',
+         '', {}, '3', 'left out: 2 rows that begin with #'),
+        # Compass points and letters are no statistics where they have a place or are listed.
+        (f'{PLACED}{COMPASS}Mean;;;;23\ns;;;;2\nn;;;;7\n', '', {}, 'E N W S R X V',
+         '3 rows of statistics'),
+        ('point,DFT\nN,20\nS,21\nX,22\nMean,21\nn,3\n', 'N S X', {}, 'N S X', ''),
+        # An empty cell of a numbered column keeps its row.
+        ('21,5;A\n22,5;A\n;A\n19,5;A\n', 'P1 P2 P3 P4', {'thickness': 1}, 'P1 P2 P4', ''),
+        # A number names a point: in any order, some of them again, where it counts no repeats.
+        ('no;DFT\n3;20\n1;21\n2;22\n', '1 2 3 4', {}, '3 1 2', ''),
+        ('no;DFT\n3;20\n1;21\n3;22\n1;20\n', '1 2 3 4', {}, '3 1 3 1', ''),
+        ('no;DFT\n1;20\n1;21\n2;22\n2;20\n', '1 2 3 4', {}, '1 1 2 2', ''),
+        (f'{COUNTED}7;100;0;50;23\n', '', {}, '7 3 7', ''),
+        (f'{COUNTED}8;100;0;50;23\n', '', {}, 'line_2 line_3 line_2', ''),
+        # A zone whose first reading is missing; rounds over all points.
+        ('Zone;no;DFT\nA;1;20\nA;2;21\nB;1;n/a\nB;2;22\n', '1 2 3 4', {}, '1 2 4', ''),
+        ('Round;No.;DFT\n' + ''.join(f'{r};{k};2{r}\n' for r in (1, 2) for k in (1, 2, 3, 4)),
+         '1 2 3 4', {}, '1 2 3 4 1 2 3 4', ''),
+    ],
+)  # fmt: skip
+def test_which_rows_are_readings_and_of_which_points(file, text, listed, columns, labels, said):
+    points = file('p.csv', listing(listed)) if listed else None
+    readings = read_readings(file('a.csv', text), points, Layout(columns=columns))
+    assert readings.point.tolist() == [label.replace('_', ' ') for label in labels.split()]
+    assert said in readings.understood
 
 
 @pytest.mark.parametrize(
@@ -356,28 +282,19 @@ def test_labels_of_listed_points_are_no_statistics(file):
         ('point;DFT [mm]\n1;24\n', {}, 'is 24000; .* it may be in another unit than is said'),
         ('point;DFT\n1;24 µm\n2;1 mil\n', {}, "DFT is '24 µm'; .* write the one unit in the hea"),
         ('Units;mils\n\npoint;DFT [µm]\n1;24\n', {}, 'thickness is in mil and µm; give all of'),
-        (
-            'Meas. pt,DFT\n' + ''.join(f'{k},2{k}\n' for k in (2, 1, 3, 4, 5, 6)),
-            {},
-            "the column 'Meas. pt' holds the labels of p.csv .* say columns: {point: Meas. pt}",
-        ),
+        ('Meas. pt,DFT\n2,22\n1,21\n3,23\n4,24\n5,25\n6,26\n', {}, 'columns: {point: Meas. pt}'),
         ('Meas. pt,X [mm],Bake history\nA,1,2\n', {}, "columns: 'Meas. pt', 'X .mm.', 'Bake hist"),
         ('a,x,y,z,DFT\n,m,m,m,ell\nP,0,0,0,1\n', {}, "thickness .*; 'DFT' is in 'ell': give it"),
-        (
-            'Point;Inner thickness;Outer thickness\nA;1;2\n',
-            {},
-            "it may be 'Inner thickness' or 'Outer thickness': name one with columns: {thick",
-        ),
+        ('Point;Inner thickness;Outer thickness\nA;1;2\n', {}, "'Inner thickness' or 'Outer"),
     ],
-)
+)  # fmt: skip
 def test_tables_without_places_that_could_mislead_are_refused(file, text, columns, message):
     with pytest.raises(ReadingsError, match=message):
         read_readings(file('a.csv', text), file('p.csv', IN_ORDER), Layout(columns=columns))
 
 
 def test_the_limits_below_an_export_are_no_readings(file):
-    listed = 'no,x_m,y_m,z_m\n1,0.1,0,0.05\n2,0.1,0,0.2\n'
-    readings = read_readings(LAYOUTS / 'elcomaster.csv', file('p.csv', listed))
+    readings = read_readings(LAYOUTS / 'elcomaster.csv', file('p.csv', listing('1 2')))
     assert readings.thickness_um == pytest.approx([21.59, 22.098])
     assert '5 rows of statistics' in readings.understood
 
@@ -394,13 +311,6 @@ def test_points_by_row_and_column_keep_their_names(file, places):
     assert readings.thickness_um.tolist() == [22.2, 22.1, 21.2, 21.1]
     assert readings.positions_m[1].tolist() == [0.1, 0.0, 0.02]
     assert readings.group.tolist() == ['Spalte 2', 'Spalte 1'] * 2
-
-
-def test_a_number_names_a_point_where_it_counts_no_repeats(file):
-    text = 'Nr;x_mm;y_mm;z_mm;DFT\n7;100;0;50;21\n3;100;0;200;22\n7;100;0;50;23\n'
-    assert read_readings(file('a.csv', text)).point.tolist() == ['7', '3', '7']
-    counted = read_readings(file('a.csv', text.replace('\n7;100;0;50;23', '\n8;100;0;50;23')))
-    assert counted.point.tolist() == ['line 2', 'line 3', 'line 2']
 
 
 @pytest.mark.parametrize('zero', ['missing', 'film', ''])

@@ -1,7 +1,7 @@
-"""One file of each layout that gauges write, read without a word about it.
+"""One file of each layout that gauges, robots and spreadsheets write, read as it is.
 
-Each holds 21.5, 22.5, 24 and 19.5 um at the points P1 to P4 of a list, in that order, unless it
-says otherwise. The layouts of the makers follow their manuals.
+The layouts follow the makers' manuals: lines about the batch, a table with units in its headings
+or in a column of its own, and the statistics of the batch below it.
 """
 
 import shutil
@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.files.gauge_readings import read_readings, write_predictions
 from paint_deposition.files.tables.gauge_formats import FOLDERS, FORMATS, LINES
 from paint_deposition.files.tables.reading_columns import Layout
-from workbook import write_workbook
+from workbook import open_document, open_row, write_workbook
 
 LAYOUTS = Path(__file__).with_name('layouts')
 FILMS_UM = [21.5, 22.5, 24.0, 19.5]
@@ -25,7 +25,7 @@ MERGED = [
     ['P1', 100, 0, 0, 21.5, 45], ['P2', 200, 0, 0, 22.5, 45],
 ]  # fmt: skip
 
-# The file, and the films and the points of its rows where they are not those four in order.
+# The file, and the films [µm] and the points of its rows where they are not those four in order.
 CASES: dict[str, tuple[str, ...]] = {
     'coatmaster Flex, CSV or JSON': ('coatmaster.csv', '21.5 22.5 19.5', 'P1 P2 P4'),
     'coatmaster Flex, JSON': ('coatmaster.json', '21.5 22.5 19.5', 'P1 P2 P4'),
@@ -74,9 +74,11 @@ def test_each_known_layout_has_its_case():
     assert not [name for name in layouts if not any(case.startswith(name) for case in CASES)]
 
 
-def test_what_the_gauge_marks_as_failed_is_counted(points):
+def test_failed_readings_are_counted_and_few_of_many_points_warned_of(points, file):
     readings = read_readings(LAYOUTS / 'coatmaster.csv', points)
     assert '1 row without a reading, 1 of them failed by error' in readings.understood
+    (doubt,) = read_readings(file('f.csv', 'Point;DFT\nP1;20\nP1;21\n'), points).doubts
+    assert doubt.startswith('only 1 of the 4 points in points.csv have a reading; see whether')
 
 
 def test_the_last_columns_of_a_measuring_machine_are_the_normal():
@@ -111,91 +113,132 @@ def test_columns_of_repeats_and_a_layer_that_is_none_can_be_named(file, points):
     assert set(readings.layer.tolist()) == {''}
 
 
-def test_an_empty_cell_of_a_numbered_column_keeps_its_row(file, points):
-    path = file('f.csv', '21,5;A\n22,5;A\n;A\n19,5;A\n')
-    readings = read_readings(path, points, Layout(columns={'thickness': 1}))
-    assert readings.point.tolist() == ['P1', 'P2', 'P4']
-
-
 @pytest.mark.parametrize(
     ('text', 'message'),
     [
-        (
-            (LAYOUTS / 'byk.csv').read_text() + 'C;1;90;20\n',
-            "'No.' counts anew in each Checkzone; give a column 'point'",
-        ),
+        ((LAYOUTS / 'byk.csv').read_text() + 'C;1;90;20\n', "'No.' counts anew in each Checkzone"),
         ('No.;DFT\n1;20\n2;21\n1;22\n2;21\n3;20\n', "'No.' counts anew; give a column 'point'"),
         ('Reading;Thickness\n21,5;0,8\n22,5;0,8\n', "'Reading' counts the readings of a DeFelsko"),
+        # One label throughout is that of the part, but not one that nearly is a point's.
+        ('point;DFT\n' + 'P9;20\n' * 4, "the readings are called 'P9' to 'P9', and there is"),
     ],
 )
-def test_a_count_names_no_point(text, message, file, points):
+def test_a_count_or_a_wrong_label_names_no_point(text, message, file, points):
     with pytest.raises(ReadingsError, match=message):
         read_readings(file('f.csv', text), points)
 
 
-@pytest.mark.parametrize(
-    ('text', 'labels'),
-    [
-        # Points in any order, some of them again.
-        ('no;DFT\n3;20\n1;21\n2;22\n', '3 1 2'),
-        ('no;DFT\n3;20\n1;21\n3;22\n1;20\n', '3 1 3 1'),
-        ('no;DFT\n1;20\n1;21\n2;22\n2;20\n', '1 1 2 2'),
-        # A zone whose first reading is missing.
-        ('Zone;no;DFT\nA;1;20\nA;2;21\nB;1;n/a\nB;2;22\n', '1 2 4'),
-    ],
-)
-def test_numbers_of_points_are_no_count(text, labels, file, points):
-    listed = points.with_name('numbers.csv')
-    listed.write_text(points.read_text().replace('P', ''))
-    assert read_readings(file('f.csv', text), listed).point.tolist() == labels.split()
+def test_a_folder_or_a_zip_with_several_tables_is_refused(tmp_path):
+    folder, path = tmp_path / 'two', tmp_path / 'two.zip'
+    folder.mkdir()
+    with zipfile.ZipFile(path, 'w') as package:
+        for name in ('monday', 'tuesday'):
+            (folder / f'{name}.csv').write_text('DFT\n1\n')
+            package.writestr(f'{name}/door.csv', 'x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
+    with pytest.raises(ReadingsError, match=r'two holds monday\.csv, tuesday\.csv; name the one'):
+        read_readings(folder)
+    # Files of one name in a zip are not taken for each other.
+    with pytest.raises(ReadingsError, match=r'holds monday/door\.csv, tuesday/door\.csv;'):
+        read_readings(path)
 
 
-def test_one_wrong_label_is_not_the_name_of_the_part(file, points):
-    with pytest.raises(ReadingsError, match="the readings are called 'P9' to 'P9', and there is"):
-        read_readings(file('f.csv', 'point;DFT\n' + 'P9;20\n' * 4), points)
+POINTS_M = np.array([[0.1, 0.0, 0.05], [0.1, 0.0, 0.2], [0.25, 0.0, 0.35]])
 
 
-def test_rounds_over_all_points_are_repeats(file, points):
-    text = 'Round;No.;DFT\n' + ''.join(f'{r};{k};2{r}\n' for r in (1, 2) for k in range(1, 5))
-    listed = points.with_name('numbers.csv')
-    listed.write_text(points.read_text().replace('P', ''))
-    assert read_readings(file('f.csv', text), listed).point.tolist() == [*'12341234']
+def require_the_four_readings(readings, within_um=1e-9):
+    """All layouts hold the same four readings at the same three points."""
+    assert readings.thickness_um == pytest.approx([21.5, 22.1, 24.0, 19.4], abs=within_um)
+    assert readings.point.tolist() == ['A1', 'A1', 'A2', 'A3']
+    assert readings.positions_m == pytest.approx(POINTS_M[[0, 0, 1, 2]], abs=1e-12)
 
 
-def test_a_template_of_which_little_was_measured_is_warned_of(file, points):
-    (doubt,) = read_readings(file('f.csv', 'Point;DFT\nP1;20\nP1;21\n'), points).doubts
-    assert doubt.startswith('only 1 of the 4 points in points.csv have a reading; see whether')
+# Files in `layouts/`, and what is said of each: a unit in a column of its own and statistics
+# behind their names; German Windows, with repeats side by side; the summary before the readings
+# and labels of points in the notes; a robot's list aligned by blanks, nominal places and measured.
+MAKERS = {
+    'elcometer': "elcometer.txt: 4 readings, commas, UTF-8; x, y, z in mm, thickness in µm from "
+    "'Reading'; left out: 1 row without a reading, 7 rows of statistics",
+    'fischer': 'tabs, cp1252, decimal comma; x, y, z in mm, thickness in µm from',
+    'positector': 'of 3 points in points.csv (semicolons, UTF-8, decimal comma), joined by '
+    "'Point', thickness in mil from 'Thickness'",
+    'robot': 'blanks, UTF-16; x, y, z in mm (no unit is given; the largest is 350), '
+    "thickness in µm (no unit is given) from 'DFT'",
+}  # fmt: skip
 
 
-def test_a_folder_with_several_tables_is_refused(tmp_path):
-    for name in 'ab':
-        (tmp_path / f'{name}.csv').write_text('DFT\n1\n')
-    message = rf'{tmp_path.name} holds a\.csv, b\.csv; name the one with the tab'
-    with pytest.raises(ReadingsError, match=message):
-        read_readings(tmp_path)
+@pytest.mark.parametrize('maker', MAKERS)
+def test_layouts_of_makers(maker):
+    points = LAYOUTS / 'points.csv' if maker == 'positector' else None
+    readings = read_readings(LAYOUTS / f'{maker}.txt', points)
+    require_the_four_readings(readings, 2e-3 if points else 1e-9)
+    assert MAKERS[maker] in readings.understood
+
+
+def test_predictions_are_written_beside_the_columns_of_the_file(tmp_path):
+    written, readings = tmp_path / 'predicted.csv', read_readings(LAYOUTS / 'fischer.txt')
+    write_predictions(written, readings, np.array([1.0, 1.0, 2.0, 3.0]))
+    lines = written.read_text().splitlines()
+    assert lines[1] == 'A1,100.0,0.0,50.0,21.5,22.1,1.0000'
+    assert len(lines) == 4
+
+
+def test_spreadsheet(tmp_path):
+    """Title rows, numbers as numbers and as text with a comma, a second sheet without readings."""
+    rows = [
+        ['Türaußenhaut, Los 17'],
+        [],
+        [None, 'Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke (µm)', 'i.O.?'],
+        [None, 'A1', 100, 0, 50, 21.5, 'ja'],
+        [None, 'A1', 100, 0, 50, '22,1', 'ja'],
+        [None, 'A2', 100, 0, 200, 24, 'ja'],
+        [None, 'A3', 250, 0, 350, '19,4', 'nein'],
+        [None, 'Mittelwert', None, None, None, 21.75],
+    ]
+    path = tmp_path / 'tuer.xlsx'
+    write_workbook(path, {'Deckblatt': [['Kunde', 'Werk 3']], 'Messung': rows})
+    readings = read_readings(path)
+    require_the_four_readings(readings)
+    assert "sheet 'Messung'" in readings.understood
+    twice = tmp_path / 'twice.xlsx'
+    write_workbook(twice, {'left': rows, 'right': rows})
+    with pytest.raises(ReadingsError, match="tables in sheet 'left' and sheet 'right'; name one"):
+        read_readings(twice)
+    require_the_four_readings(read_readings(twice, layout=Layout(sheet='right')))
+
+
+def test_open_document_whose_empty_rest_is_said_to_repeat(tmp_path):
+    """As LibreOffice writes it: empty cells and rows to the end of the sheet."""
+    rows = [
+        ('Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke [µm]'),
+        ('A1', 100.0, 0.0, 50.0, 21.5),
+        ('A1', 100.0, 0.0, 50.0, 22.1),
+        ('A2', 100.0, 0.0, 200.0, 24.0),
+        ('A3', 250.0, 0.0, 350.0, 19.4),
+    ]
+    rest = open_row(rows=1_048_571, empty=16_384)
+    path = tmp_path / 'tuer.ods'
+    path.write_bytes(open_document(''.join(open_row(*row, empty=16_379) for row in rows) + rest))
+    require_the_four_readings(read_readings(path))
 
 
 # What else shops have: each is read as these readings, or refused with the reason.
 PLACED = 'Punkt;X [mm];Y [mm];Z [mm];Dicke [µm]\nA1;100,0;0;50;21,5\nA2;100,0;0;200;22,1\n'
 SHEET = ['Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Dicke [µm]']
+FIRST, SECOND = ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, 22.1]
 IN_CELLS = {
     'units below, a title above': [
         ['Schichtdicke Tür'], ['Messpunkt', 'X', 'Y', 'Z', 'Dicke'],
         [None, 'mm', 'mm', 'mm', 'µm'],
-        ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, '22,1'],
+        FIRST, [*SECOND[:4], '22,1'],
     ],
-    'statistics without labels': [
-        SHEET, ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, 22.1], [], [None] * 4 + [21.8],
-    ],
+    'statistics without labels': [SHEET, FIRST, SECOND, [], [None] * 4 + [21.8]],
 }  # fmt: skip
 REFUSED_CELLS = {
     'stands over several columns or is a title': [[*SHEET, None], ['A1', 100, 0, 50, 21.5, 22]],
     "'12.5' beside it in line 3 has no heading": [
         ['Dicke', None, None], ['Ort', 'Basis', 'Klar'], ['A1', 12.5, 21.5],
     ],
-    "sheet 'S', row 3: Dicke .* is '#DIV/0!'; expected .* or n/a where": [
-        SHEET, ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, '#DIV/0!'],
-    ],
+    "sheet 'S', row 3: Dicke .* is '#DIV/0!'; expe": [SHEET, FIRST, [*SECOND[:4], '#DIV/0!']],
     "sheet 'S', row 3: X .* is ''": [SHEET, ['A1', 100, 0, 50, 21.5], [None] * 4 + [21.5]],
 }  # fmt: skip
 
@@ -230,13 +273,4 @@ def test_what_stands_around_a_table_of_a_workbook(tmp_path, rows):
 def test_cells_that_could_mislead_are_refused(tmp_path, message):
     path = write_workbook(tmp_path / 'a.xlsx', {'S': REFUSED_CELLS[message]})
     with pytest.raises(ReadingsError, match=message):
-        read_readings(path)
-
-
-def test_files_of_one_name_in_a_zip_are_not_taken_for_each_other(tmp_path):
-    path = tmp_path / 'two.zip'
-    with zipfile.ZipFile(path, 'w') as package:
-        for folder in ('monday', 'tuesday'):
-            package.writestr(f'{folder}/door.csv', 'x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
-    with pytest.raises(ReadingsError, match=r'holds monday/door\.csv, tuesday/door\.csv;'):
         read_readings(path)

@@ -19,6 +19,7 @@ TURNS = Rotation.from_euler(
     'ZYX', [[10, -20, 170], [12, -18, 175], [15, -15, 179], [20, -10, 170], [25, 5, 160]], True
 )
 ON = [0, 1, 1, 0, 0]
+HEAD = 't,x,y,z,qx,qy,qz,qw'
 
 
 # What must be said to read a file of `poses/`, each of which has the motion in another layout.
@@ -51,11 +52,10 @@ def test_every_layout_is_the_same_motion(path):
         ('DO_12,flow', ['0,0', '1,0.9', '1,1.1', '0,0', '0,0'], {'state_topic': 'DO_12'}),
     ],
 )  # fmt: skip
-def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
+def test_the_trigger_holds_from_its_row_on(heading, flows, options, file):
     head, *rows = (LAYOUTS / 'plain.csv').read_text(encoding='utf-8-sig').splitlines()
     lines = (f'{row},{flow}' for row, flow in zip(rows, flows, strict=True))
-    (tmp_path / 'poses.csv').write_text('\n'.join([f'{head},{heading}', *lines]))
-    read = read_recording(tmp_path / 'poses.csv', **options)
+    read = read_recording(file('p.csv', '\n'.join([f'{head},{heading}', *lines])), **options)
     assert np.array_equal(read.trigger_stamps_ns, read.stamps_ns)
     expected = [float(str(flow).rsplit(',')[-1]) for flow in flows]
     assert np.allclose(read.trigger_flow, expected)
@@ -70,42 +70,36 @@ def test_the_tool_may_spray_along_another_of_its_axes(axis):
     assert sprays == pytest.approx(-column if axis[0] == '-' else column, abs=1e-6)
 
 
-def test_a_turned_tool_keeps_the_norms_by_which_damage_is_known(tmp_path):
+def test_a_turned_tool_keeps_the_norms_by_which_damage_is_known(file):
     rows = ['0,1,2,3,0,0,0,0.3', '1,1,2,4,0,0,0,0', '2,1,2,5,nan,0,0,1', '3,1,2,6,0,0,0,1.004']
-    (tmp_path / 'p.csv').write_text('t,x,y,z,qx,qy,qz,qw\n' + '\n'.join(rows))
-    turned = read_recording(tmp_path / 'p.csv', tool_axis='x').quaternions_xyzw
+    path = file('p.csv', '\n'.join([HEAD, *rows]))
+    turned = read_recording(path, tool_axis='x').quaternions_xyzw
     norms = np.linalg.norm(turned, axis=1)
     assert norms == pytest.approx([0.3, 0.0, np.nan, 1.004], nan_ok=True)
 
 
-def test_t_beside_o_and_a_is_an_angle(tmp_path):
-    rows = ['1,2,3,10,20,30,0.5', '1,2,4,10,20,30,0.5']
-    (tmp_path / 'p.csv').write_text('x,y,z,O,A,T,speed_m_per_s\n' + '\n'.join(rows))
-    read = read_recording(tmp_path / 'p.csv', rotation='kawasaki')
+def test_t_beside_o_and_a_is_an_angle(file):
+    text = 'x,y,z,O,A,T,speed_m_per_s\n1,2,3,10,20,30,0.5\n1,2,4,10,20,30,0.5\n'
+    read = read_recording(file('p.csv', text), rotation='kawasaki')
     assert read.duration_s == pytest.approx(2.0)
 
 
-def test_what_could_be_the_trigger_is_named(tmp_path):
+def test_what_could_be_the_trigger_is_named(file):
     rows = [f'{k / 10},{k},2,3,0,0,0,1,{word},0' for k, word in enumerate(('AUS', 'EIN', 'aus'))]
-    (tmp_path / 'p.csv').write_text('t,x,y,z,qx,qy,qz,qw,Pistole,DO2\n' + '\n'.join(rows))
-    (warning,) = read_recording(tmp_path / 'p.csv').warnings
+    path = file('p.csv', '\n'.join([f'{HEAD},Pistole,DO2', *rows]))
+    (warning,) = read_recording(path).warnings
     assert warning.startswith('the gun counts as always on; if Pistole is its trigger')
-    read = read_recording(tmp_path / 'p.csv', state_topic='Pistole')
+    read = read_recording(path, state_topic='Pistole')
     assert (read.trigger_flow.tolist(), read.warnings) == ([0.0, 1.0, 0.0], ())
 
 
-def test_an_empty_table_has_no_joints_either(tmp_path):
-    (tmp_path / 'p.csv').write_text('')
+def test_an_empty_table_has_no_joints_either(file):
     with pytest.raises(RecordingError, match=r'no columns .* \(its first row: none\)'):
-        read_recording(tmp_path / 'p.csv', urdf=str(URDF))
+        read_recording(file('p.csv', ''), urdf=str(URDF))
 
 
 def test_a_workbook_is_a_log_too(tmp_path):
-    rows = [
-        ['t', *'xyz', 'qx', 'qy', 'qz', 'qw'],
-        [0, 1, 2, 3, 0, 0, 0, 1],
-        [0.1, 1, 2, '4,5', 0, 0, 0, 1],
-    ]
+    rows = [HEAD.split(','), [0, 1, 2, 3, 0, 0, 0, 1], [0.1, 1, 2, '4,5', 0, 0, 0, 1]]
     twice = write_workbook(tmp_path / 'twice.xlsx', {'Log': rows, 'Old': rows})
     with pytest.raises(RecordingError, match='from a file with one such sheet: save it by itself'):
         read_recording(twice)
@@ -113,38 +107,41 @@ def test_a_workbook_is_a_log_too(tmp_path):
     assert read_recording(path).positions_m.tolist() == [[1, 2, 3], [1, 2, 4.5]]
 
 
-def test_words_switch_the_gun_and_a_flow_counts_while_it_is_on(tmp_path):
+def test_words_switch_the_gun_and_a_flow_counts_while_it_is_on(file):
     rows = ['0,1,2,3,0,0,0,1,on,0.8', '0.1,1,2,4,0,0,0,1,OFF,0.8', '0.2,1,2,5,0,0,0,1,true,nan']
-    (tmp_path / 'poses.csv').write_text('t,x,y,z,qx,qy,qz,qw,trigger,flow\n' + '\n'.join(rows))
-    assert read_recording(tmp_path / 'poses.csv').trigger_flow.tolist() == [0.8, 0.0, 1.0]
+    read = read_recording(file('p.csv', '\n'.join([f'{HEAD},trigger,flow', *rows])))
+    assert read.trigger_flow.tolist() == [0.8, 0.0, 1.0]
 
 
-def test_times_of_a_clock_keep_their_nanoseconds(tmp_path):
-    stamp = 1_760_000_000_123_456_789
-    for heading, cell in (('stamp_ns', str(stamp)), ('t', '1760000000.123456789')):
-        rows = f'{heading},x,y,z,qx,qy,qz,qw\n{cell},0,0,0,0,0,0,1\n{cell},1,0,0,0,0,0,1\n'
-        (tmp_path / 'poses.csv').write_text(rows)
-        assert read_recording(tmp_path / 'poses.csv').stamps_ns.tolist() == [stamp, stamp]
+@pytest.mark.parametrize(
+    ('heading', 'cell', 'stamp'),
+    [
+        ('stamp_ns', '1760000000123456789', 1_760_000_000_123_456_789),
+        ('t', '1760000000.123456789', 1_760_000_000_123_456_789),
+        ('t', '−0.5', -500_000_000),
+    ],
+)
+def test_times_keep_their_nanoseconds_and_the_minus_of_print(file, heading, cell, stamp):
+    rows = [f'{heading},x,y,z,qx,qy,qz,qw', *(f'{cell},{x},0,0,0,0,0,1' for x in (0, 1))]
+    assert read_recording(file('p.csv', '\n'.join(rows))).stamps_ns.tolist() == [stamp, stamp]
 
 
-def test_a_time_may_have_a_minus_of_print(tmp_path):
-    rows = 't,x,y,z,qx,qy,qz,qw\n−0.5,0,0,0,0,0,0,1\n0,1,0,0,0,0,0,1\n'
-    (tmp_path / 'poses.csv').write_text(rows)
-    assert read_recording(tmp_path / 'poses.csv').stamps_ns.tolist() == [-500_000_000, 0]
-
-
-def test_one_table_is_the_motion_of_one_gun():
+def test_a_second_gun_and_options_of_other_kinds_of_files_are_refused():
     with pytest.raises(RecordingError, match=r'plain\.csv is no bag and has the motion of one'):
         read_gun_motions([LAYOUTS / 'plain.csv'], MotionSource(), ['a', 'b'])
+    with pytest.raises(RecordingError, match='--pose-topic is for bags'):
+        read_recording(LAYOUTS / 'plain.csv', '/pose')
+    with pytest.raises(RecordingError, match="rotation: 'zxq' is no convention; give 'rotvec'"):
+        read_recording(LAYOUTS / 'plain.csv', rotation='zxq')
+    with pytest.raises(RecordingError, match="'ZZX' is no convention"):
+        read_recording(LAYOUTS / 'plain.csv', rotation='ZZX')
 
 
-def test_the_frame_of_the_poses_is_read(tmp_path):
-    text = 't,x,y,z,qx,qy,qz,qw,frame_id\n0,0,0,0,0,0,0,1,base\n1,1,0,0,0,0,0,1,base\n'
-    (tmp_path / 'poses.csv').write_text(text)
-    assert read_recording(tmp_path / 'poses.csv', frame_id='base').frame_id == 'base'
-    (tmp_path / 'poses.csv').write_text(text.replace('base\n1', 'world\n1'))
-    with pytest.raises(RecordingError, match=r'poses\.csv: poses in frames base, world'):
-        read_recording(tmp_path / 'poses.csv')
+def test_the_frame_of_the_poses_is_read(file):
+    text = f'{HEAD},frame_id\n0,0,0,0,0,0,0,1,base\n1,1,0,0,0,0,0,1,base\n'
+    assert read_recording(file('p.csv', text), frame_id='base').frame_id == 'base'
+    with pytest.raises(RecordingError, match=r'p\.csv: poses in frames base, world'):
+        read_recording(file('p.csv', text.replace('base\n1', 'world\n1')))
 
 
 PASSES = 'x,y,z,qx,qy,qz,qw,speed\n0,0,0,0,0,0,1,1\n'
@@ -154,47 +151,36 @@ PASSES = 'x,y,z,qx,qy,qz,qw,speed\n0,0,0,0,0,0,1,1\n'
     ('text', 'words'),
     [
         ('', 'no columns x, y, z'),
-        ('t,x,y,z,qx,qy,qz,qw\n', 'no poses'),
+        (f'{HEAD}\n', 'no poses'),
         ('t,x,y,z,qx,qy,qz\n0,0,0,0,0,0,0\n', 'no orientation among the columns'),
         ('n,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n', 'no time among the columns'),
-        ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n0,0,?,0,0,0,0,1\n1,0\n', "line 3: y is '?'"),
-        ('t,x,y,z,qx,qy,qz,qw\n0,2350,0,0,0,0,0,1\n', 'reach 2350 and have no unit'),
+        (f'{HEAD}\n0,0,0,0,0,0,0,1\n0,0,?,0,0,0,0,1\n1,0\n', "line 3: y is '?'"),
+        (f'{HEAD}\n0,2350,0,0,0,0,0,1\n', 'reach 2350 and have no unit'),
         ('t,x_mm,y,z,qx,qy,qz,qw\n0,2,0,0,0,0,0,1\n', 'in mm, no unit; give all in m or in mm'),
         ('t,x,y,z,rx_deg,ry_deg,rz_deg\n0,0,0,0,9,0,0\n', 'Euler angles or a rotation vector'),
         ('t,x,y,z,alpha,beta,gamma\n0,0,0,0,9,0,0\n', 'unknown convention'),
         ('t,x,y,z,roll,pitch,yaw\n0,0,0,0,90,0,0\n', 'reach 90 and are read in rad'),
         ('t,x,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,0,1\n', 'x x could all be x; keep one'),
-        ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n9e9,0,0,0,0,0,0,1\n', 'write its unit'),
-        ('t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,0,0,0,0,1\n', 'line 2: 12 values under 8 column'),
-        ('t,x,y,z,qx,qy,qz,qw\n8:15:02,0,0,0,0,0,0,1\n', "the time of day '8:15:02'; give sec"),
-        ('t,x,y,z,qx,qy,qz,qw\ntrue,0,0,0,0,0,0,1\n', 'has a word for a number'),
-        (f'{PASSES}1,0,0,0,0,0,0,1\n',
-         'line 3: 1 0 0 0 0 0 0 is no pose; give seven numbers'),
+        (f'{HEAD}\n0,0,0,0,0,0,0,1\n9e9,0,0,0,0,0,0,1\n', 'write its unit'),
+        (f'{HEAD}\n0,0,0,1,0,0,0,0,0,0,0,1\n', 'line 2: 12 values under 8 column'),
+        (f'{HEAD}\n8:15:02,0,0,0,0,0,0,1\n', "the time of day '8:15:02'; give sec"),
+        (f'{HEAD}\ntrue,0,0,0,0,0,0,1\n', 'has a word for a number'),
+        (f'{PASSES}1,0,0,0,0,0,0,1\n', 'line 3: 1 0 0 0 0 0 0 is no pose; give seven numbers'),
         (f'{PASSES}1,0,0,0,0,0,0.9,1\n', 'line 3: 1 0 0 0 0 0 0.9'),
         (f'{PASSES}nan,0,0,0,0,0,1,1\n', 'line 3: nan 0 0'),
         (f'{PASSES}1,0,0,0,0,0,1,inf\n', 'speed inf m/s; give'),
-        ('t,x,y,z,qx,qy,qz,qw,flow [ml/min]\n0,0,0,0,0,0,0,1,300\n', 'relative to the calibrated'),
+        (f'{HEAD},flow [ml/min]\n0,0,0,0,0,0,0,1,300\n', 'relative to the calibrated'),
     ],
-)  # fmt: skip
-def test_what_cannot_be_read_for_certain_is_refused(text, words, tmp_path):
-    (tmp_path / 'poses.csv').write_text(text)
+)
+def test_what_cannot_be_read_for_certain_is_refused(text, words, file):
+    path = file('poses.csv', text)
     with pytest.raises(RecordingError) as refused:
-        read_recording(tmp_path / 'poses.csv')
-    assert str(tmp_path / 'poses.csv') in str(refused.value)
+        read_recording(path)
+    assert str(path) in str(refused.value)
     assert words in str(refused.value)
 
 
 @pytest.mark.parametrize(('suffix', 'rotation'), [('.src', 'kuka'), ('.LS', 'fanuc')])
-def test_a_program_that_is_not_read_says_what_to_export(suffix, rotation, tmp_path):
-    (tmp_path / f'door{suffix}').write_text('DEF door()\nLIN P1\nEND\n')
+def test_a_program_that_is_not_read_says_what_to_export(suffix, rotation, file):
     with pytest.raises(RecordingError, match=rf'as a table with x, .* --rotation {rotation}$'):
-        read_recording(tmp_path / f'door{suffix}')
-
-
-def test_options_of_other_kinds_of_files_are_refused():
-    with pytest.raises(RecordingError, match='--pose-topic is for bags'):
-        read_recording(LAYOUTS / 'plain.csv', '/pose')
-    with pytest.raises(RecordingError, match="rotation: 'zxq' is no convention; give 'rotvec'"):
-        read_recording(LAYOUTS / 'plain.csv', rotation='zxq')
-    with pytest.raises(RecordingError, match="'ZZX' is no convention"):
-        read_recording(LAYOUTS / 'plain.csv', rotation='ZZX')
+        read_recording(file(f'door{suffix}', 'DEF door()\nLIN P1\nEND\n'))

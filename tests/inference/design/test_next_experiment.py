@@ -9,7 +9,6 @@ from scipy.stats import multivariate_normal
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.inference.design import next_experiment
 from paint_deposition.inference.design.contenders import Forecast, Placement, contenders_of
 from paint_deposition.inference.design.sprays import MENU, together
@@ -38,7 +37,7 @@ def fit(study):
 def drifting(study, fit):
     """The panel as it reads where the air drifts."""
     (panel,) = study.campaign.experiments
-    drifting = fit.model.with_effect(AirDrift(shift_down_m=0.03))
+    drifting = fit.model.with_effect(EFFECTS['air_drift'](shift_down_m=0.03))
     film_um = Forward(study.campaign, drifting.effects).predict_um(drifting)
     noise_um = study.gauge_um * np.random.default_rng(2).normal(size=len(film_um))
     places_m = panel.measured_points.positions_m
@@ -51,13 +50,12 @@ def drift_or_tool(drifting, fit):
     """Drifting air, or a tool that is off its point: what says which."""
     found = drifting.fit(FreeParameters.of(fit.model))
     group = EffectClass(('air_drift', 'tcp_offset'), 0.9, 'air_drift')
-    return next_experiment.propose(
-        drifting, contenders_of(diagnosed(drifting, found, group), EFFECTS)
-    )
+    rivals = contenders_of(diagnosed(drifting, found, group), EFFECTS)
+    return next_experiment.propose(drifting, rivals)
 
 
 @pytest.mark.slow
-def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drifting, drift_or_tool):
+def test_a_rolled_gun_tells_air_from_a_tool_and_places_lie_apart(drifting, drift_or_tool, study):
     """The air drifts in the booth, the tool is off in its own frame."""
     by_changes = {spray.changes: spray for spray in drift_or_tool[1]}
     rolled = by_changes['roll_180',]
@@ -66,9 +64,7 @@ def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drifting, drift_or_to
     # Half a turn of the part in the booth does to the air what half a turn of the gun does to it.
     assert by_changes['upside_down',].separation > 0.8 * rolled.separation
     assert rolled.chance > 0.7
-    # The order of the passes tells nothing of it: it is not among the best.
     assert ('reverse_order',) not in by_changes
-    # One spot will do.
     spot = by_changes['standing', 'roll_180']
     assert spot.separation > 2.0 * spot.now
     told = spot.to_dict()['stand']
@@ -79,10 +75,6 @@ def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drifting, drift_or_to
     points = drifting.campaign.experiments[0].measured_points
     (row,) = np.flatnonzero((points.positions_m == at).all(axis=1))
     assert told['film_um'] == pytest.approx(drifting.measured_um[row])
-
-
-@pytest.mark.slow
-def test_places_lie_on_the_surface_apart_and_off_the_edge(study, fit, drift_or_tool):
     places, _ = drift_or_tool
     positions = np.array([place.position_m for place in places])
     surface = study.campaign.experiments[0].surface
@@ -101,7 +93,7 @@ def test_places_lie_on_the_surface_apart_and_off_the_edge(study, fit, drift_or_t
 
 def test_without_voltage_what_needs_it_is_gone(study):
     experiment = BY_KEY['voltage_off'].made(study.campaign.experiments[0])
-    ridge, drift = EFFECTS['convex_attraction'].typical(), AirDrift(shift_down_m=0.03)
+    ridge, drift = EFFECTS['convex_attraction'].typical(), EFFECTS['air_drift'](shift_down_m=0.03)
     left = pd.DepositionModel(effects=(ridge, drift)).without(experiment.switched_off)
     assert left.effect('convex_attraction').is_neutral
     assert left.effect('air_drift') == drift
@@ -113,9 +105,8 @@ def test_every_spray_is_the_same_paint_another_way(study, change):
     changed = change.made(experiment).path
     share = {'half_flow': 0.5, 'double_flow': 2.0, 'half_speed': 2.0, 'double_speed': 0.5}
     if change.key == 'turned':
-        assert np.median(changed.speed_m_per_s) == pytest.approx(
-            np.median(experiment.path.speed_m_per_s), rel=0.02
-        )
+        before, after = (np.median(p.speed_m_per_s) for p in (experiment.path, changed))
+        assert after == pytest.approx(before, rel=0.02)
     elif change.key != 'longer_open':
         expected = share.get(change.key, 1.0) * experiment.path.spraying_time_s
         assert changed.spraying_time_s == pytest.approx(expected)
@@ -162,8 +153,6 @@ def test_all_of_the_leading_group_compete_and_the_shapeless_cause_where_it_does(
     assert contenders_of(diagnosed(study, fit, group), {}) == ()
 
 
-# How much further readings tell between explanations, against draws of these readings.
-
 READINGS, DRAWS = 6, 40_000
 
 
@@ -173,25 +162,20 @@ def forecast(spread: float = 1.0) -> Forecast:
     means = rng.normal(size=(3, READINGS))
     roots = spread * rng.normal(size=(3, READINGS, 2))
     covariances = np.eye(READINGS) + roots @ roots.transpose(0, 2, 1)
-    contenders = [
-        SimpleNamespace(is_effect=True), SimpleNamespace(is_effect=True),
-        SimpleNamespace(is_effect=False),
-    ]  # fmt: skip
+    contenders = [SimpleNamespace(is_effect=is_effect) for is_effect in (True, True, False)]
     return Forecast(contenders, np.array([0.0, 0.4, 1.0]), means, np.linalg.cholesky(covariances))
 
 
 def log_odds_drawn(told: Forecast, true: int, other: int) -> np.ndarray:
     """(DRAWS,) logarithm of the odds of the true one after readings that it gives."""
     rng = np.random.default_rng(4)
-    laws = [
-        multivariate_normal(mean, factor @ factor.T)
-        for mean, factor in zip(told.means, told.factors, strict=True)
-    ]
+    each = zip(told.means, told.factors, strict=True)
+    laws = [multivariate_normal(mean, factor @ factor.T) for mean, factor in each]
     readings = laws[true].rvs(DRAWS, rng)
     return told.odds[true, other] + laws[true].logpdf(readings) - laws[other].logpdf(readings)
 
 
-def test_the_log_odds_are_those_of_readings_that_are_drawn():
+def test_the_log_odds_are_those_of_drawn_readings_and_nothing_tells_between_the_same():
     told = forecast()
     for true, other in ((0, 1), (1, 0), (0, 2)):
         drawn = log_odds_drawn(told, true, other)
@@ -199,18 +183,16 @@ def test_the_log_odds_are_those_of_readings_that_are_drawn():
         error = drawn.std() / np.sqrt(DRAWS)
         assert told.odds[true, other] + mean == pytest.approx(drawn.mean(), abs=4.0 * error)
         assert variance == pytest.approx(drawn.var(), rel=0.05)
-
-
-def test_nothing_tells_between_explanations_that_say_the_same():
     told = forecast()
-    same = replace(
-        told,
-        log_weight=np.zeros(3),
-        means=np.tile(told.means[0], (3, 1)),
-        factors=np.tile(told.factors[0], (3, 1, 1)),
-    )
+    means, factors = np.tile(told.means[0], (3, 1)), np.tile(told.factors[0], (3, 1, 1))
+    same = replace(told, log_weight=np.zeros(3), means=means, factors=factors)
     assert same.separations == pytest.approx((0.0, 0.0), abs=1e-6)
     assert same.chance == 0.0
+    # Equal errors leave the distance of the means.
+    told = forecast(spread=0.0)
+    two = Forecast(told.contenders[:2], np.zeros(2), told.means[:2], told.factors[:2])
+    away = float(np.linalg.norm(told.means[1] - told.means[0]))
+    assert two.separations == pytest.approx((0.0, away))
 
 
 @pytest.mark.parametrize(('spread', 'alike', 'tolerance'), [(1.0, True, 1e-6), (0.5, False, 0.15)])
@@ -224,13 +206,6 @@ def test_single_readings_add_up_to_all_of_them(spread, alike, tolerance):
         placement.take(reading)
     found = placement.separation(placement.nearest())
     assert found == pytest.approx(told.separations[1], rel=tolerance)
-
-
-def test_equal_errors_leave_the_distance_of_the_means():
-    told = forecast(spread=0.0)
-    two = Forecast(told.contenders[:2], np.zeros(2), told.means[:2], told.factors[:2])
-    away = float(np.linalg.norm(told.means[1] - told.means[0]))
-    assert two.separations == pytest.approx((0.0, away))
 
 
 def test_some_readings_are_predicted_from_others():

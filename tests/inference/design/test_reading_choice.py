@@ -11,12 +11,8 @@ import paint_deposition as pd
 from booth import MODEL, panel, path_of, serpentine
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ReadingsError
-from paint_deposition.inference.design.reading_choice import (
-    CandidateDesign,
-    choose,
-    design_at,
-    power,
-)
+from paint_deposition.inference.design import reading_choice
+from paint_deposition.inference.design.reading_choice import CandidateDesign, choose, design_at
 from paint_deposition.inference.design.sprays import MENU
 from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.model_space import SIZES
@@ -31,25 +27,21 @@ def on_panel(*names: str) -> UnmeasuredPart:
     return UnmeasuredPart(panel(), path, MODEL, {name: EFFECTS[name] for name in names})
 
 
-def test_noncentrality_is_what_the_model_cannot_imitate():
+def test_noncentrality_is_what_no_model_can_imitate_and_power_that_of_the_ratio():
     """Against the covariance of noise and model parameters, built in full."""
     random, rows = np.random.default_rng(4), np.arange(0, 40, 3)
-    design = CandidateDesign(
-        3.0 * random.normal(size=(40, 3)), random.normal(size=(40, 5)), np.array([*'aabcd'])
-    )
+    free, columns = 3.0 * random.normal(size=(40, 3)), random.normal(size=(40, 5))
+    design = CandidateDesign(free, columns, np.array([*'aabcd']))
     free, columns = design.free[rows], design.columns[rows]
     covariance = np.eye(len(rows)) + free @ free.T
     exact = np.diag(columns.T @ np.linalg.solve(covariance, columns))
     np.testing.assert_allclose(design.beyond_model(rows)[2], exact, rtol=1e-9)
-
-
-def test_power_is_that_of_the_likelihood_ratio():
-    """Both tails of a normal score are one tail of the noncentral chi-square."""
+    # Both tails of a normal score are one tail of the noncentral chi-square.
     strength = np.array([0.0, 2.0, 8.0])
     limit = chi2.isf(0.05 / 6, 1)
     squares = np.maximum(np.multiply.outer(strength, SIZES**2), 1e-12)
     exact = ncx2.sf(limit, 1, squares).mean(axis=1)
-    np.testing.assert_allclose(power(strength, 6), exact, rtol=1e-6)
+    np.testing.assert_allclose(reading_choice.power(strength, 6), exact, rtol=1e-6)
 
 
 def test_places_taken_one_by_one_are_about_the_best_of_all_sets():
@@ -59,7 +51,7 @@ def test_places_taken_one_by_one_are_about_the_best_of_all_sets():
     design = CandidateDesign(free, columns, np.array(['a', 'b', 'c']))
 
     def worth(rows: np.ndarray) -> float:
-        return float(power(design.beyond_model(rows)[2], 3).mean())
+        return float(reading_choice.power(design.beyond_model(rows)[2], 3).mean())
 
     apart = np.arange(10)[:, np.newaxis] * np.eye(3)[0]
     best = max(worth(np.array(rows)) for rows in combinations(range(10), 3))
@@ -80,10 +72,8 @@ def test_an_effect_is_measured_where_it_shows():
     part = on_panel('air_drift')
     chosen = choose(part, 12)
     places = grid_places(part.surface, chosen.film_um > 0.2 * chosen.film_um.max(), 12)
-    found, even = (
-        design_at(part, rows).beyond_model(np.arange(12))[2].min()
-        for rows in (chosen.vertices, places)
-    )
+    designs = (design_at(part, rows) for rows in (chosen.vertices, places))
+    found, even = (design.beyond_model(np.arange(12))[2].min() for design in designs)
     assert found > 1.5 * even
     assert chosen.power['air_drift'] > chosen.grid_power['air_drift']
     assert all(effects in ((), ('air_drift',)) for effects in chosen.speaks_for)
@@ -98,20 +88,15 @@ def test_what_the_model_has_already_is_not_looked_for():
     assert design_at(part, painted).free.shape[1] > len(MODEL.planar.model_dump())
 
 
-def test_a_part_without_paint_is_refused():
+def test_a_part_without_paint_and_impossible_wishes_are_refused():
     part = on_panel('flow_drift')
     aside = part.path.with_(position_m=np.add(part.path.position_m, [0.0, 0.0, 5.0]))
     with pytest.raises(ReadingsError, match='no paint lands'):
         choose(replace(part, path=aside), 12)
-
-
-@pytest.mark.parametrize(
-    ('count', 'repeats', 'words'),
-    [(4, 0, '12 to 400'), (20, 21, 'ask for 0 to 20'), (300, 0, 'room for 0')],
-)
-def test_impossible_wishes_are_refused(count, repeats, words):
-    with pytest.raises(ReadingsError, match=words):
-        choose(on_panel('flow_drift'), count, repeats, foot_m=0.6 if count == 300 else 0.015)
+    for wish, foot_m, words in (((4, 0), 0.015, '12 to 400'), ((20, 21), 0.015, 'for 0 to 20'),
+                                ((300, 0), 0.6, 'room for 0')):  # fmt: skip
+        with pytest.raises(ReadingsError, match=words):
+            choose(part, *wish, foot_m=foot_m)
 
 
 BELL = pd.DepositionModel()
@@ -124,8 +109,8 @@ def sample_panel(sample):
     return sample.experiments[0]
 
 
-def stand(sample_panel, **more) -> StationarySpray:
-    return StationarySpray.before(sample_panel, spots(sample_panel, 1)[0], BELL, MOST_UM, **more)
+def stand(sample_panel) -> StationarySpray:
+    return StationarySpray.before(sample_panel, spots(sample_panel, 1)[0], BELL, MOST_UM)
 
 
 def film_um(sample_panel, one, model=BELL):
@@ -150,13 +135,12 @@ def test_the_film_stays_within_the_one_given_and_comes_near_it(sample_panel):
     assert 0.7 * MOST_UM < film.max() <= one.peak_um <= MOST_UM
     half = film_um(sample_panel, replace(one, dwell_s=0.5 * one.dwell_s))
     assert half == pytest.approx(0.5 * film, rel=1e-9)
-    closer = StationarySpray.before(
-        BY_KEY['closer'].made(sample_panel), spots(sample_panel, 1)[0], BELL, MOST_UM
-    )
+    spot = spots(sample_panel, 1)[0]
+    closer = StationarySpray.before(BY_KEY['closer'].made(sample_panel), spot, BELL, MOST_UM)
     assert closer.dwell_s < one.dwell_s
     assert 0.7 * MOST_UM < film_um(sample_panel, closer).max() <= MOST_UM
     # Half a second is needed: the trigger is not quick enough for less film.
-    assert StationarySpray.before(sample_panel, spots(sample_panel, 1)[0], BELL, 0.1) is None
+    assert StationarySpray.before(sample_panel, spot, BELL, 0.1) is None
 
 
 @pytest.mark.parametrize('name', ['corner_slowdown', 'gun_wake', 'pose_lag'])
@@ -169,14 +153,11 @@ def test_effects_of_motion_do_not_show(sample_panel, name):
     assert film_um(sample_panel, one, model) == pytest.approx(film_um(sample_panel, one), abs=1e-9)
 
 
-def test_effects_of_a_whole_job_do_not_suit_a_spot():
+def test_effects_of_a_whole_job_do_not_suit_a_spot_and_a_film_that_may_sag_is_told():
     assert suits(BELL, {'lateral shift', 'curvature'})
     assert not suits(BELL, {'lateral shift', 'order'})
     fog = BELL.model_copy(update={'effects': (EFFECTS['overspray_fog'].typical(),)})
     assert not suits(fog, {'lateral shift'})
-
-
-def test_a_film_that_may_sag_is_told():
     thick = Spray('the same passes at twice the flow', ('a', 'b'), 4.0, 1.0, peak_um=60.0,
                   peak_now_um=30.0)  # fmt: skip
     assert thick.film_words == 'the film will reach 60 µm, now 30: see that it does not sag'

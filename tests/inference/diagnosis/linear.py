@@ -34,24 +34,15 @@ def correlated(parameters: FreeParameters, seed: int = 0) -> Posterior:
 KNOWN = replace(PARAMETERS, known=correlated(PARAMETERS))
 
 
-def linear_fit(
-    random: np.random.Generator,
-    count: int,
-    data: np.ndarray | None = None,
-    parameters: FreeParameters = PARAMETERS,
-) -> Fit:
-    """A fit of readings (count,), drawn if not given, of a linear model with noise 1."""
+def linear_fit(random: np.random.Generator, count: int, parameters=PARAMETERS) -> Fit:
+    """A fit of readings (count,) of a linear model with noise 1."""
     prior = parameters.prior
     jacobian = random.normal(size=(count, len(prior.centre))) @ prior.whitening
-    if data is None:
-        data = jacobian @ (prior.centre + prior.factor @ random.normal(size=len(prior.centre)))
-        data = data + random.normal(size=count)
-    return fit_linear(jacobian, data, parameters)
+    data = jacobian @ (prior.centre + prior.factor @ random.normal(size=len(prior.centre)))
+    return fit_linear(jacobian, data + random.normal(size=count), parameters)
 
 
-def fit_linear(
-    jacobian: np.ndarray, data: np.ndarray, parameters: FreeParameters = PARAMETERS
-) -> Fit:
+def fit_linear(jacobian: np.ndarray, data: np.ndarray, parameters=PARAMETERS) -> Fit:
     """The most probable values (ridge regression toward the priors)."""
     prior = parameters.prior
     covariance = prior.factor @ prior.factor.T
@@ -60,10 +51,8 @@ def fit_linear(
     misfit = data - jacobian @ prior.centre
     vector = prior.centre + gain @ np.linalg.solve(innovation, misfit)
     predicted = jacobian @ vector
-    nuisance = np.empty((len(data), 0))
-    return Fit(
-        parameters, vector, parameters.start, predicted, data - predicted, jacobian, True, nuisance
-    )
+    found = predicted, data - predicted, jacobian, True, np.empty((len(data), 0))
+    return Fit(parameters, vector, parameters.start, *found)
 
 
 def null_of(fit: Fit, nuisance: np.ndarray | None = None) -> NullModel:
@@ -77,21 +66,14 @@ def discrepancy_of(
     """Fields (P, P) of three lengths and a deviation of the footprint (P, 1), but nothing else."""
     none, unseen = np.zeros_like(fields[0]), np.empty((0, 1))
     basis = Basis(LearnedFootprint, {}, unseen, unseen.T, 1.0)
-    footprints = Footprints(
-        tuple(size * footprint for size in sizes),
-        tuple(RandomLaw(basis, 0.1 * size * np.eye(1)) for size in sizes),
-        radius_m=np.zeros(1),
-        flux=np.ones(1),
-    )
-    one_setting = np.zeros(len(none), dtype=int)
-    return ModelDiscrepancy(
-        MODEL, footprints, none, tuple(fields), 3 * (none,), False, (0.02, 0.05, 0.1), one_setting
-    )
+    columns = tuple(size * footprint for size in sizes)
+    laws = tuple(RandomLaw(basis, 0.1 * size * np.eye(1)) for size in sizes)
+    footprints = Footprints(columns, laws, radius_m=np.zeros(1), flux=np.ones(1))
+    rest = 3 * (none,), False, (0.02, 0.05, 0.1), np.zeros(len(none), dtype=int)
+    return ModelDiscrepancy(MODEL, footprints, none, tuple(fields), *rest)
 
 
-def law(
-    name: str, *columns: np.ndarray, side: float = 1.0, share: float = 1.0, **shape: float
-) -> Explanation:
+def law(name: str, *columns: np.ndarray, side=1.0, share=1.0, **shape: float) -> Explanation:
     """An effect by the directions (P,) of its first amplitudes, which are ten sizes wide."""
     effect = EFFECTS[name](**shape)
     names = effect.amplitudes()[: len(columns)]

@@ -49,8 +49,7 @@ def plate_with_a_back() -> Experiment:
     front, off_m = panel(0.4, 0.04), np.array([0.0, 0.002, 0.0])
     faces = np.concatenate([front.faces, front.faces[:, ::-1] + len(front.vertices_m)])
     vertices_m = np.concatenate([front.vertices_m, front.vertices_m - off_m])
-    plate = pd.Surface.from_triangles(vertices_m, faces, 0.04)
-    part = measured(plate, 'panel')
+    part = measured(pd.Surface.from_triangles(vertices_m, faces, 0.04), 'panel')
     read = part.readings
     both = pd.Readings.of(
         np.vstack([read.positions_m, read.positions_m[0] - off_m]),

@@ -6,27 +6,19 @@ import numpy as np
 import pytest
 
 from booth import MODEL
-from inference.diagnosis.readings_on_door import (
-    at_model,
-    on_door,
-    on_panel,
-    plate_with_a_back,
-    study_of,
-)
+from inference.diagnosis import readings_on_door
+from inference.diagnosis.readings_on_door import at_model, on_door, on_panel, study_of
 from paint_deposition.effects.learned_laws import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.design.sprays import MENU
-from paint_deposition.inference.diagnosis.discrepancy import (
-    FINE_RADII,
-    PRIOR,
-    ModelDiscrepancy,
-    painted_alike,
-)
+from paint_deposition.inference.diagnosis import discrepancy as of_nature
+from paint_deposition.inference.diagnosis.discrepancy import FINE_RADII, PRIOR, ModelDiscrepancy
 from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
 from paint_deposition.inference.fitting.study import Study
 
 # Parts of the study: a door, and a panel twice.
 DOOR, FIRST, SECOND = range(3)
+X = np.array([1.0, 0.0, 0.0])
 
 
 @pytest.fixture(scope='module')
@@ -51,7 +43,7 @@ def between(study: Study, covariance: np.ndarray, one: int, other: int) -> np.nd
     return covariance[np.ix_(owner == one, owner == other)]
 
 
-def test_choices_are_covariances_and_as_probable_as_one(discrepancy, alone):
+def test_choices_are_as_probable_as_one_also_with_what_an_earlier_job_says(discrepancy, alone):
     for found, repeated in ((discrepancy, True), (alone[1], False)):
         choices = found.choices()
         for sizes in choices:
@@ -68,9 +60,6 @@ def test_choices_are_covariances_and_as_probable_as_one(discrepancy, alone):
     usual = [sizes for sizes in discrepancy.choices() if not sizes.is_beyond_nature]
     best = max(usual, key=lambda sizes: sizes.log_prior)
     assert (best.setting, best.part) == (0.02, 0.01)
-
-
-def test_what_an_earlier_job_says_of_the_footprint_is_a_prior_of_its_size(discrepancy):
     told = replace(discrepancy, known_footprint=(PRIOR.footprints[0], 1.1)).choices()
     prior = np.zeros(len(PRIOR.footprints))
     for sizes in told:
@@ -91,9 +80,8 @@ def test_parts_painted_alike_share_the_setting_and_others_the_footprint(study, d
         assert between(study, parts, FIRST, FIRST) == pytest.approx(own)
         assert not between(study, parts, FIRST, SECOND).any()
         assert not between(study, parts, DOOR, DOOR).any()
-    assert between(study, shapes, FIRST, SECOND) == pytest.approx(
-        between(study, shapes, FIRST, FIRST)
-    )
+    own = between(study, shapes, FIRST, FIRST)
+    assert between(study, shapes, FIRST, SECOND) == pytest.approx(own)
     for sizes in discrepancy.choices():
         assert not between(study, discrepancy.of_parts(sizes), DOOR, FIRST).any()
         assert between(study, discrepancy.of_footprint(sizes), DOOR, FIRST).any()
@@ -123,15 +111,12 @@ def mean_flux(radius_m: np.ndarray, power: tuple[float, float] = (1.0, 1.0)) -> 
     return p.K1_cm3_per_s * (ring + centre) / p.peak_flux_um_per_s
 
 
-def test_the_footprint_deviates_by_a_share_of_its_peak_and_its_tails_may_be_of_another_power(
-    alone,
-):
+def test_the_footprint_deviates_by_a_share_of_its_peak_its_tails_by_another_power(alone):
     study, discrepancy = alone
     basis = footprint_basis(study, MODEL, FINE_RADII)
     knots_m = np.linspace(0.0, basis.settings['reach_m'], FINE_RADII)
-    flux, tables = mean_flux(knots_m), [
-        of_peak.reshape(FINE_RADII, WAVES, -1) for of_peak in discrepancy.footprint.of_peak
-    ]  # fmt: skip
+    flux, shape = mean_flux(knots_m), (FINE_RADII, WAVES, -1)
+    tables = [of_peak.reshape(shape) for of_peak in discrepancy.footprint.of_peak]
     for size, of_peak in zip(PRIOR.footprints, tables, strict=True):
         # The pattern hardly moves the second harmonics.
         sd = np.sqrt(np.sum(of_peak[:, 3:] ** 2, axis=2))
@@ -152,7 +137,6 @@ def test_the_footprint_changes_the_readings_by_what_no_pattern_does(alone):
     columns, law = discrepancy.footprint.columns[-1], discrepancy.footprint.laws[-1]
     by_knots = law.change_um / study.sigma_um[:, np.newaxis]
     assert columns[:, :2] == pytest.approx(by_knots[:, :2])
-    # The pattern follows between the knots, too.
     amounts = np.random.default_rng(1).normal(size=columns.shape[1])
     assert np.corrcoef(columns @ amounts, by_knots @ amounts)[0, 1] > 0.95
     fit = at_model(study)
@@ -201,14 +185,13 @@ def test_beside_another_fit_only_pattern_and_place_vary_otherwise(study, discrep
     assert around.settings is discrepancy.settings
     assert around.footprint is discrepancy.footprint
     assert not np.allclose(around.shapes, discrepancy.shapes)
-    np.testing.assert_allclose(
-        discrepancy.around(study, at_model(study)).shapes, discrepancy.shapes
-    )
+    same = discrepancy.around(study, at_model(study))
+    np.testing.assert_allclose(same.shapes, discrepancy.shapes)
 
 
 def test_where_no_paint_lands_nothing_is_left_over():
     """On the back of a plate the model predicts exactly 0."""
-    study = study_of(plate_with_a_back())
+    study = study_of(readings_on_door.plate_with_a_back())
     discrepancy = ModelDiscrepancy.of(study, at_model(study))
     covariance = discrepancy.covariance(discrepancy.choices()[-1])
     assert not covariance[-1].any()
@@ -217,14 +200,15 @@ def test_where_no_paint_lands_nothing_is_left_over():
 
 def test_which_parts_were_painted_alike():
     part = on_panel()
-    path = part.path
     near, far = (
-        replace(part, path=path.with_(position_m=np.add(path.position_m, [away_m, 0.0, 0.0])))
+        replace(part, path=part.path.with_(position_m=np.add(part.path.position_m, away_m * X)))
         for away_m in (0.002, 0.05)
     )
     off = replace(part, switched_off=frozenset(['voltage']))
     menu = {change.key: change.made(part) for change in MENU}
-    found = painted_alike([part, near, far, on_door(count=16), off, replace(part, name='again')])
+    found = of_nature.painted_alike(
+        [part, near, far, on_door(count=16), off, replace(part, name='again')]
+    )
     assert found.tolist() == [0, 0, 1, 2, 3, 0]
     for key in ('half_flow', 'double_speed', 'further', 'turned', 'longer_open', 'voltage_off'):
-        assert painted_alike([part, menu[key]]).tolist() == [0, 1], key
+        assert of_nature.painted_alike([part, menu[key]]).tolist() == [0, 1], key

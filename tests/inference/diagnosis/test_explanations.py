@@ -55,18 +55,11 @@ def size(columns: np.ndarray) -> np.ndarray:
     return np.linalg.norm(columns, axis=1)
 
 
-def test_without_effects_no_law_is_off(study):
-    assert errors(study).shape == (len(study), 0)
-    assert errors(study, EDGE, kept=()).shape == (len(study), 0)
-    assert not errors(study, type(EDGE)()).any()
-
-
 @pytest.mark.parametrize(
-    ('name', 'values'), [('overspray_fog', {'fog_um': 3.0}), ('air_drift', {'shift_down_m': 0.02})]
+    'effect', [EFFECTS['overspray_fog'](fog_um=3.0), EFFECTS['air_drift'](shift_down_m=0.02)]
 )
-def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(study, name, values):
+def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(study, effect):
     """Over the conditions that the effect names, over all others, and of a law of another form."""
-    effect = EFFECTS[name](**values)
     share = np.abs(change_um(study, effect)) / study.sigma_um
     expected = np.hypot(explanations.LAW_ERROR, explanations.OTHER_ERROR) * share
     assert size(errors(study, effect)) == pytest.approx(expected, rel=0.03)
@@ -97,9 +90,12 @@ def test_over_conditions_of_others_what_the_pattern_would_follow_is_no_error_of_
 
 @pytest.mark.parametrize('effect', [e for e in EFFECTS.values() if e.exact], ids=lambda e: e.id)
 def test_geometry_and_gauge_have_no_law_that_could_be_off(study, effect):
+    nothing = (len(study), 0)
     for of in (explanations.law_errors, another_form):
-        assert errors(study, effect.typical(), of=of).shape == (len(study), 0)
+        assert errors(study, effect.typical(), of=of).shape == nothing
     assert errors(study, effect.typical(), EDGE).shape == errors(study, EDGE).shape
+    assert errors(study).shape == errors(study, EDGE, kept=()).shape == nothing
+    assert not errors(study, type(EDGE)()).any()
 
 
 def test_an_own_effect_may_name_any_covariate_and_no_other(study):
@@ -127,18 +123,14 @@ def test_errors_of_several_effects_are_independent(study):
     np.testing.assert_allclose(both, sum(each), atol=1e-9 * both.max())
 
 
-def test_where_an_effect_was_switched_off_or_no_paint_lands_its_law_has_no_error(
-    monkeypatch,
-):
+def test_where_an_effect_was_off_or_no_paint_lands_its_law_has_no_error(monkeypatch):
     """On the back of a plate the model predicts exactly 0."""
     monkeypatch.setattr(type(EDGE), 'needs', 'voltage')
     off = on_door(switched_off=frozenset(['voltage']))
     doors = study_of(on_door(), replace(off, name='without voltage'))
     plate = study_of(plate_with_a_back())
-    for study, none in (
-        (doors, doors.campaign.experiment_of == 1),
-        (plate, plate.forward.predict_um(MODEL) == 0.0),
-    ):
+    bare = plate.forward.predict_um(MODEL) == 0.0
+    for study, none in ((doors, doors.campaign.experiment_of == 1), (plate, bare)):
         found = size(errors(study, EDGE))
         assert none.any()
         assert found[~none].max() > 0.05
@@ -148,10 +140,8 @@ def test_where_an_effect_was_switched_off_or_no_paint_lands_its_law_has_no_error
 def test_laws_of_any_form_leave_the_film_as_a_whole_as_it_is(study):
     """How much paint there is in all is the pattern's."""
     fit = study.fit(FreeParameters.of(MODEL))
-    for found in (
-        explanations.nonparametric_laws_of(study, MODEL),
-        explanations.of_footprint(study, fit),
-    ):
+    laws = explanations.nonparametric_laws_of(study, MODEL)
+    for found in (laws, explanations.of_footprint(study, fit)):
         assert sum(explanation.share for explanation in found) == pytest.approx(1.0)
         for explanation in found:
             assert explanation.cause == explanations.UNKNOWN
@@ -169,9 +159,8 @@ def test_what_the_model_has_is_not_looked_for():
     study = study_of(on_panel())
     fit = replace(linear_fit(np.random.default_rng(0), len(study)), model=MODEL.with_effect(EDGE))
     others = ('corner_slowdown', 'fog_gradient')
-    candidates = {
-        name: explanations.neutral_shapes(EFFECTS[name]) for name in ('edge_build', *others)
-    }
+    names = ('edge_build', *others)
+    candidates = {name: explanations.neutral_shapes(EFFECTS[name]) for name in names}
     found = list(explanations.of_effects(study, fit, candidates))
     assert {explanation.cause for explanation in found} == set(others)
     for cause in others:
@@ -226,36 +215,23 @@ def test_a_curve_made_from_a_form_is_named_with_its_parameters(form, x, unit, cu
     assert sum(held) >= 3
 
 
-def test_an_addition_is_in_micrometres():
+def test_an_addition_is_in_micrometres_and_a_value_below_zero_written_with_a_plus():
     x, sd = np.linspace(0.0, 0.2, KNOTS), np.full(KNOTS, 0.05)
     best = fitting_forms(x, 6.0 * np.exp(-x / 0.05), sd, unit='m', addition=True)[0]
     assert best.name in ('exponential', 'saturating')
     assert best.formula.startswith('addition [um] = ')
     assert 'level_um' in best.parameters
     assert fitting_forms(x, np.zeros(KNOTS), sd, unit='m', addition=True) == ()
-
-
-def test_a_form_about_a_value_below_zero_is_written_with_a_plus():
     x = np.linspace(-4.0, 2.0, KNOTS)
     forms = fitting_forms(x, 0.9 + 0.1 * x, np.full(KNOTS, 0.004), unit='1/m')
     assert any('(x + 1)' in form.formula for form in forms)
     assert not any('- -' in form.code + form.formula for form in forms)
 
 
-@pytest.mark.parametrize(
-    ('change', 'sd'),
-    [
-        (0.1 * np.sin(TIME_S / 2.5), 0.02),
-        (0.3 * np.sin(TIME_S / 2.5), 0.02),
-        (0.003 * np.random.default_rng(1).normal(size=KNOTS), 0.02),
-    ],
-    ids=['wavy', 'very wavy', 'flat'],
-)
-def test_a_wiggly_or_flat_curve_has_none(change, sd):
-    assert fitting_forms(TIME_S, 1.0 + change, np.full(KNOTS, sd), unit='s') == ()
-
-
-def test_a_wide_band_leaves_several_forms_and_says_so():
+def test_a_wiggly_or_flat_curve_has_no_form_and_a_wide_band_leaves_several():
+    wave, noise = np.sin(TIME_S / 2.5), np.random.default_rng(1).normal(size=KNOTS)
+    for change in (0.1 * wave, 0.3 * wave, 0.003 * noise):
+        assert fitting_forms(TIME_S, 1.0 + change, np.full(KNOTS, 0.02), unit='s') == ()
     forms = fitting_forms(STANDOFF, STANDOFF**-0.5, np.full(KNOTS, 0.04))
     assert len(forms) > 3
     assert forms[0].probability < 0.9

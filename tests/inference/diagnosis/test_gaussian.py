@@ -1,11 +1,12 @@
 """Log Bayes factors in closed form, and laws of any form as changes of readings."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.integrate import dblquad
-from scipy.stats import f, kstest, multivariate_normal, multivariate_t, norm
+from scipy.stats import f, kstest, multivariate_t, norm
 
 import paint_deposition as pd
 from booth import MODEL
@@ -40,16 +41,7 @@ def discrepancy(columns):
     return 2.0 * columns @ columns.T
 
 
-def log_density(data: np.ndarray, covariance: np.ndarray, freedom: float):
-    """Student's where the noise was estimated, else the normal one."""
-    if np.isinf(freedom):
-        return multivariate_normal.logpdf(data, cov=covariance)
-    return multivariate_t.logpdf(data, shape=covariance, df=freedom)
-
-
-def test_the_null_model_has_the_covariance_of_pattern_nuisance_and_discrepancy(
-    fit, columns, discrepancy
-):
+def test_the_null_model_has_the_covariance_of_all_that_varies(fit, columns, discrepancy):
     """It is the same where the discrepancy is given as columns; some readings have their part."""
     plain = null_of(fit, columns)
     prior = fit.parameters.prior
@@ -58,13 +50,9 @@ def test_the_null_model_has_the_covariance_of_pattern_nuisance_and_discrepancy(
     deviation = fit.residual + fit.jacobian @ (fit.vector - prior.centre)
     assert plain.lower @ plain.lower.T == pytest.approx(covariance)
     rows = np.arange(READINGS) % 3 > 0
-    for null in (
-        gaussian.NullModel.around(fit, columns, discrepancy=discrepancy),
-        gaussian.NullModel.around(fit, columns, discrepancy=covariance).with_discrepancy(
-            discrepancy
-        ),
-        plain.beside(np.sqrt(2.0) * columns),
-    ):
+    around = partial(gaussian.NullModel.around, fit, columns)
+    other, beside = around(discrepancy=covariance), plain.beside(np.sqrt(2.0) * columns)
+    for null in (around(discrepancy=discrepancy), other.with_discrepancy(discrepancy), beside):
         assert null.lower @ null.lower.T == pytest.approx(covariance + discrepancy)
         assert null.lower @ null.deviation == pytest.approx(deviation)
         part = null.select(rows)
@@ -123,7 +111,8 @@ def test_factor_is_the_ratio_of_densities_whatever_does_not_show(count, freedom)
     assert found.columns.shape[1] == min(count, 12)
     factor = found.log_bayes_factors(data, np.array([0.7]), freedom)[0]
     covariance = np.eye(12) + 0.49 * columns @ columns.T
-    of_one, of_none = (log_density(data.T, c, freedom) for c in (covariance, np.eye(12)))
+    shapes = covariance, np.eye(12)
+    of_one, of_none = (multivariate_t(shape=c, df=freedom).logpdf(data.T) for c in shapes)
     np.testing.assert_allclose(factor, of_one - of_none, rtol=1e-8)
     amounts = found.amplitudes(data[:, 0], np.array([0.7]))[0]
     mean = 0.49 * columns.T @ np.linalg.solve(covariance, data[:, 0])
@@ -140,16 +129,11 @@ def test_shifted_deviations_are_weighed_as_if_they_were_there(columns, side):
     np.testing.assert_allclose(principal.log_bayes_factors(draws, SIZES, 8.0, shifts), expected)
 
 
+LAWS = [law for name, law in LEARNED.items() if name != 'speed_m_per_s']
 OF_ANY_KIND = pytest.mark.parametrize(
-    ('law', 'kind'),
-    [
-        (law, kind)
-        for law in LEARNED.values()
-        for kind in law.kinds
-        if law is not LEARNED['speed_m_per_s']
-    ],
+    ('law', 'kind'), [(law, kind) for law in LAWS for kind in law.kinds],
     ids=lambda value: value if isinstance(value, str) else value.covariate,
-)
+)  # fmt: skip
 
 
 @pytest.fixture(scope='module')
@@ -228,17 +212,12 @@ def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():
     assert not door.film_um[owner > 0].any()
     assert not panel.film_um[owner == 0].any()
     assert np.array_equal(panel.film_um[owner == 1], panel.film_um[owner == 2])
-    # The laws say so themselves.
     points = [experiment.measured_points for experiment in study.campaign.experiments]
     grids = both.settings['maps']
     assert grids == (*door.settings['maps'], *panel.settings['maps'])
-    assert [[grid.is_of(p) for p in points] for grid in grids] == [
-        [True, False, False],
-        [False, True, True],
-    ]
+    of_grid = [[grid.is_of(p) for p in points] for grid in grids]
+    assert of_grid == [[True, False, False], [False, True, True]]
 
-
-# How well a learned curve is known: its band covers the true one as often as it says.
 
 KNOTS, LENGTH, SIZE = 12, 3.0, 0.1
 FILM_UM, NOISE_UM = 30.0, 0.6
@@ -262,9 +241,7 @@ def fitted(law: smooth_laws.RandomLaw, truth: np.ndarray, random: np.random.Gene
     return replace(fit, nuisance=law.change_um / NOISE_UM)
 
 
-def covered(
-    law: smooth_laws.RandomLaw, truth: np.ndarray, random: np.random.Generator
-) -> np.ndarray:
+def covered(law: smooth_laws.RandomLaw, truth: np.ndarray, random) -> np.ndarray:
     """(K,) whether the band of a fit holds the true curve at the knots, but for its level."""
     learned = law.learned(*fitted(law, truth, random).amplitudes)
     away = np.array(learned.learned) - truth
@@ -275,22 +252,18 @@ def covered(
 @pytest.fixture
 def law() -> smooth_laws.RandomLaw:
     """Readings that are few on one side."""
-    places = (KNOTS - 1) * np.random.default_rng(1).beta(1.0, 2.0, size=60)
-    return at_places(places)
+    return at_places((KNOTS - 1) * np.random.default_rng(1).beta(1.0, 2.0, size=60))
 
 
 def test_the_band_holds_curves_of_the_prior_as_often_as_it_says(law):
-    random = np.random.default_rng(2)
-    held = [
-        covered(law, law.at_knots @ random.normal(size=law.at_knots.shape[1]), random)
-        for _ in range(300)
-    ]
+    random, count = np.random.default_rng(2), law.at_knots.shape[1]
+    held = [covered(law, law.at_knots @ random.normal(size=count), random) for _ in range(300)]
     # The standard error is below 0.7 %, as a curve counts for several independent values.
     assert np.mean(held) == pytest.approx(0.95, abs=0.02)
     assert np.mean(held, axis=0) == pytest.approx(np.full(KNOTS, 0.95), abs=0.05)
 
 
-def test_the_band_is_wide_where_readings_are_few_and_no_wider_than_before_them(law):
+def test_the_band_is_wide_where_readings_are_few_and_not_for_a_level_of_the_pattern(law):
     random = np.random.default_rng(4)
     fit = fitted(law, np.zeros(KNOTS), random)
     sd, before = law.sd(fit.amplitudes[1]), law.sd(np.eye(law.at_knots.shape[1]))
@@ -298,10 +271,7 @@ def test_the_band_is_wide_where_readings_are_few_and_no_wider_than_before_them(l
     assert (sd < before).all()
     doubled = replace(fit, nuisance=0.5 * fit.nuisance, jacobian=0.5 * fit.jacobian)
     assert (law.sd(doubled.amplitudes[1]) > 1.2 * sd).all()
-
-
-def test_a_level_that_the_pattern_takes_up_does_not_widen_the_band(law):
-    """It would hide the form: the level of pattern and factor together is known, not each."""
+    # A level would hide the form: that of pattern and factor together is known, not each.
     covariance = fitted(law, np.zeros(KNOTS), np.random.default_rng(5)).amplitudes[1]
     level = np.sqrt(np.diag(law.at_knots @ covariance @ law.at_knots.T)).min()
     assert level > 2.0 * np.median(law.sd(covariance))

@@ -43,25 +43,20 @@ def nulls(change: np.ndarray, **others: np.ndarray) -> learning.Nulls:
     return {kind: beside.get(kind, null) for kind in KINDS}
 
 
-def test_a_law_is_learned_once_where_there_is_one():
+def test_a_law_is_learned_once_where_it_says_more_than_what_may_vary_already():
     assert learning.choose_laws(nulls(0.0 * WAVE), [WAVY], np.inf) == []
     among = [replace(WAVY, columns=0.0 * CHANGE), WAVY, WAVY]
     ((number, size),) = learning.choose_laws(nulls(WAVE), among, np.inf)
     assert number in (1, 2)
     assert size > 1.0
     assert learning.choose_laws(nulls(WAVE), [replace(WAVY, random=None)], np.inf) == []
-
-
-def test_a_law_must_say_more_than_what_may_vary_already():
-    """Than any footprint could; but a correction of a law need not say more than its errors."""
+    # A correction of a law need not say more than the errors of that law.
     hidden = nulls(WAVE, other=3.0 * CHANGE)
     assert learning.choose_laws(hidden, [WAVY], np.inf) == []
     assert len(learning.choose_laws(hidden, [replace(WAVY, corrects='edge_build')], np.inf)) == 1
     beside = nulls(WAVE, **dict.fromkeys(KINDS, 3.0 * CHANGE))
     assert learning.choose_laws(beside, [WAVY], np.inf) == []
 
-
-# Three panels of which the passes were painted in three orders.
 
 BASE = pd.DepositionModel()
 THREE = (*ORDERS, (0.7, 0.3, 1.5, 1.1))
@@ -75,10 +70,7 @@ def begun(campaign: pd.Campaign, *library: str) -> DiagnosisState:
 
 @pytest.mark.slow
 def test_what_no_law_explains_is_learned_without_the_parts_left_out():
-    """The error is that of learning the law from the other parts and predicting the last.
-
-    The flow rises and levels off, which no effect of the library does.
-    """
+    """The flow rises and levels off, which no effect of the library does."""
     rising = gauged(BASE.with_effect(RISING), seed=2, orders=THREE)
     nothing = Search(begun(rising)).nothing
     over_time = [law for law in nothing.state.nonparametric_laws if law.learns == 'time_s']
@@ -138,10 +130,9 @@ def test_a_fold_that_calls_for_another_set_goes_no_further():
     assert [stages[0].chosen(folds != k).names for k in range(3)] == [one.names for one in sets]
     # Where the last set is found and then pruned to the first one, it is so in every fold.
     for final, by_fold in ((last, sets), (first, [first] * len(parts))):
+        fits = [one.fit for one in by_fold]
         expected = study.errors_left_out_um(
-            lambda out, by_fold=by_fold: study.predicted_without_um(
-                by_fold[folds[out][0]].fit, out
-            )
+            lambda out, fits=fits: study.predicted_without_um(fits[folds[out][0]], out)
         )
         found_um = learning.LeftOut(stages, final, []).errors_um()
         assert found_um == pytest.approx([expected] * (1 + learning.MOST_LAWS))
@@ -171,6 +162,5 @@ def test_the_unexplained_is_told_by_its_place_its_size_and_the_part_that_it_bega
     on_all = replace(unknown, parts=('panel 1', *unknown.parts), since='', mean_residual_um=-6.0)
     assert 'less than the model says, on panel 1, panel 2, panel 3; it' in str(on_all)
     nowhere = replace(unknown, parts=(), where='no single place stands out')
-    assert str(nowhere) == (
-        f'It shows most against {unknown.covariate}; no single place stands out.'
-    )
+    shows = f'It shows most against {unknown.covariate}; no single place stands out.'
+    assert str(nowhere) == shows

@@ -5,16 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.special import logsumexp
-from scipy.stats import binom, kstest, multivariate_normal, multivariate_t
+from scipy.stats import binom, kstest, multivariate_t
 
 from inference.diagnosis import linear
 from inference.diagnosis.linear import law, unknown
 from paint_deposition.inference.diagnosis import model_space, proposals
-from paint_deposition.inference.diagnosis.discrepancy import (
-    PRIOR,
-    DiscrepancyHyperparameters,
-    ModelDiscrepancy,
-)
+from paint_deposition.inference.diagnosis.discrepancy import PRIOR, ModelDiscrepancy
+from paint_deposition.inference.diagnosis.discrepancy import DiscrepancyHyperparameters as Sizes
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.gaussian import NullModel, simulated
 from paint_deposition.inference.diagnosis.model_space import ModelSpace, WeightedNull
@@ -26,12 +23,12 @@ CHANCE = 0.01
 # Places along a part, and the film over the noise.
 PLACE, FILM = np.linspace(0.0, 3.0, READINGS), 40.0
 SMALL, USUAL, LARGE, BEYOND = (
-    DiscrepancyHyperparameters(share, 0.0, 1, 2, 0.0)
-    for share in (0.006, PRIOR.most_usual, 0.06, PRIOR.beyond_nature)
+    Sizes(share, 0.0, 1, 2, 0.0) for share in (0.006, PRIOR.most_usual, 0.06, PRIOR.beyond_nature)
 )
 # A change that neighbours share, and one that they do not.
 WAVE = np.sin(2.0 * PLACE)
 JAGGED = 0.7 * np.random.default_rng(2).normal(size=READINGS)
+LENGTHS_M = (0.05, 0.1, 0.3)
 # Sizes of the footprint, over the largest.
 SHARES = (0.1, 0.3, 1.0)
 
@@ -61,10 +58,7 @@ def found() -> list[Explanation]:
 
     return [
         law('air_drift', direction(0.8), direction(0.8), side=0),
-        *(
-            law('corner_slowdown', direction(0.9), share=1.0 / 3.0, length_m=length_m)
-            for length_m in (0.05, 0.1, 0.3)
-        ),
+        *(law('corner_slowdown', direction(0.9), share=1 / 3, length_m=x) for x in LENGTHS_M),
         law('edge_build', direction(0.7)),
         law('faraday_shielding', direction(1.2)),
         *(unknown(0.3 * random.normal(size=(READINGS, 6)), 0.5) for _ in range(2)),
@@ -77,12 +71,9 @@ def shifted(null: NullModel, change: np.ndarray) -> NullModel:
 
 
 def space_of(
-    plain: NullModel,
-    found: list[Explanation],
-    discrepancy: ModelDiscrepancy,
-    *sizes: DiscrepancyHyperparameters,
+    plain: NullModel, found: list[Explanation], discrepancy: ModelDiscrepancy, *sizes: Sizes,
     freedom: float = np.inf,
-) -> ModelSpace:
+) -> ModelSpace:  # fmt: skip
     weighed = [WeightedNull.of(plain, discrepancy, one, freedom) for one in sizes or (SMALL,)]
     return ModelSpace(weighed, found, discrepancy, freedom)
 
@@ -95,11 +86,9 @@ def probability(space: ModelSpace, cause: str) -> float:
 def drawn_spaces(plain, found, discrepancy, of, known, freedom=np.inf) -> list[ModelSpace]:
     """Of readings that a discrepancy of one size made, at the sizes that are known."""
     null = plain.with_discrepancy(discrepancy.covariance(of))
-    draws = simulated(READINGS, freedom, NULL_RUNS, seed=11)
-    return [
-        space_of(NullModel.of(plain.columns, raw), found, discrepancy, *known, freedom=freedom)
-        for raw in (null.lower @ draws).T
-    ]
+    draws = null.lower @ simulated(READINGS, freedom, NULL_RUNS, seed=11)
+    nulls = (NullModel.of(plain.columns, raw) for raw in draws.T)
+    return [space_of(one, found, discrepancy, *known, freedom=freedom) for one in nulls]
 
 
 @pytest.fixture
@@ -109,10 +98,9 @@ def few_draws(monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(('size', 'freedom'), [(SMALL, np.inf), (LARGE, 15.0)])
-def test_the_p_value_is_uniform_where_nothing_is_missing(
-    plain, found, discrepancy, freedom, size, few_draws
-):
-    def p_values(*known: DiscrepancyHyperparameters) -> np.ndarray:
+@pytest.mark.usefixtures('few_draws')
+def test_the_p_value_is_uniform_where_nothing_is_missing(plain, found, discrepancy, freedom, size):
+    def p_values(*known: Sizes) -> np.ndarray:
         spaces = drawn_spaces(plain, found, discrepancy, size, known, freedom)
         return np.array([space.p_value(seed) for seed, space in enumerate(spaces)])
 
@@ -137,9 +125,7 @@ def test_sprays_that_differ_more_than_usual_ones_are_told(plain, discrepancy, fe
 
 
 @pytest.mark.parametrize('freedom', [np.inf, 12.0])
-def test_odds_are_those_of_densities_averaged_over_all_sizes_and_shapes(
-    plain, discrepancy, freedom
-):
+def test_odds_are_those_of_densities_averaged_over_sizes_and_shapes(plain, discrepancy, freedom):
     """What differs by more than nature's settings do counts as unknown."""
     shapes = [law('edge_build', c, side=0, share=0.5) for c in (JAGGED, JAGGED + WAVE)]
     shapeless = unknown(np.stack([WAVE, JAGGED], axis=1))
@@ -147,14 +133,10 @@ def test_odds_are_those_of_densities_averaged_over_all_sizes_and_shapes(
     sizes = [replace(SMALL, log_prior=-1.0), replace(LARGE, log_prior=-0.5), BEYOND]
     space = space_of(there, [*shapes, shapeless], discrepancy, *sizes, freedom=freedom)
 
-    def density(one: DiscrepancyHyperparameters, columns: np.ndarray) -> float:
+    def density(one: Sizes, columns: np.ndarray) -> float:
         null = plain.with_discrepancy(discrepancy.covariance(one) + columns @ columns.T)
-        covariance = null.lower @ null.lower.T
-        if np.isinf(freedom):
-            value = multivariate_normal.logpdf(there.scaled_deviation, cov=covariance)
-        else:
-            value = multivariate_t.logpdf(there.scaled_deviation, shape=covariance, df=freedom)
-        return float(value) + one.log_prior
+        of = multivariate_t(shape=null.lower @ null.lower.T, df=freedom)
+        return float(of.logpdf(there.scaled_deviation)) + one.log_prior
 
     none = np.zeros((READINGS, 1))
     nothing = logsumexp([density(one, none) for one in sizes[:2]])
@@ -241,9 +223,8 @@ def test_the_deviation_of_the_footprint_is_told(plain, discrepancy):
 def test_sizes_that_matter_only_beside_an_effect_are_kept(plain, discrepancy):
     """A strong effect that is smooth looks like a large discrepancy as long as it is missing."""
     there, edge = shifted(plain, 6.0 * WAVE), law('edge_build', 6.0 * WAVE)
-    without, with_it = (
-        model_space.probable_hyperparameters(there, discrepancy, e, np.inf) for e in ([], [edge])
-    )
+    kept_of = model_space.probable_hyperparameters
+    without, with_it = (kept_of(there, discrepancy, e, np.inf) for e in ([], [edge]))
     for kept in (without, with_it):
         beyond = [size.is_beyond_nature for size in kept]
         assert {size.footprint for size in kept} == set(range(len(SHARES)))

@@ -10,10 +10,6 @@ import paint_deposition as pd
 from inference.diagnosis.readings_on_door import DOOR, SHIELDED
 from inference.fitting.panels import ORDERS, gauged, reading
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.effects.library.faraday_shielding import FaradayShielding
-from paint_deposition.effects.library.flow_drift import FlowDrift
-from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.files.atomic import json_text
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
@@ -23,7 +19,7 @@ from paint_deposition.inference.readings.campaign import Experiment
 from small_campaign import small_campaign
 
 pytestmark = pytest.mark.slow
-BASE = pd.DepositionModel()
+BASE, SHIELDING = pd.DepositionModel(), EFFECTS['faraday_shielding']
 
 
 @pytest.fixture(scope='module')
@@ -74,8 +70,8 @@ def test_the_effect_is_named_and_predicts_readings_left_out(found):
     assert 'faraday_shielding' in best.members
     assert {EFFECTS[name].family for name in best.members} == {'curvature'}
     assert best.probability > SURE
-    assert [step.added for step in found.history] == ['', best.best]
     before, after = found.history
+    assert (before.added, after.added) == ('', best.best)
     assert after.rmse_um < 0.8 * before.rmse_um
     assert after.holdout_rmse_um < before.holdout_rmse_um
     content = json.loads(json_text(found.to_dict()))
@@ -88,16 +84,14 @@ def test_the_effect_is_named_and_predicts_readings_left_out(found):
     figures = content['rmse_um']
     assert {when: figures[f'holdout_{when}'] for when in errors} == errors
     assert figures['left_out'] == 'points'
-    # All are of one residual.
     (part,) = content['experiments']
     assert [part['rmse_before_um'], part['rmse_after_um']] == [before.rmse_um, after.rmse_um]
     assert [figures['before'], figures['after']] == [before.rmse_um, after.rmse_um]
 
 
 def test_an_effect_outside_the_library_is_not_blamed_on_another(tmp_path):
-    campaign = small_campaign(
-        tmp_path, **DOOR | {'seed': 22, 'truth': 'convex_attraction', 'amplitude': 0.3}
-    )
+    hidden = {'seed': 22, 'truth': 'convex_attraction', 'amplitude': 0.3}
+    campaign = small_campaign(tmp_path, **DOOR | hidden)
     # Those that look alike on these readings, as the effect itself declares, would be right, too.
     alike = {'convex_attraction', *EFFECTS['convex_attraction'].rivals}
     library = {key: effect for key, effect in EFFECTS.items() if key not in alike}
@@ -105,7 +99,6 @@ def test_an_effect_outside_the_library_is_not_blamed_on_another(tmp_path):
     assert diagnosis.verdict in ('unknown_effect', 'undecided')
     assert all(name.startswith('learned:') for name in diagnosis.accepted)
     assert diagnosis.p_value < 0.01
-    # What is learned over a covariate is offered all the same.
     curve = diagnosis.unknown.curve
     assert set(curve) == {diagnosis.unknown.covariate, 'residual_um'}
     assert np.isfinite(list(curve.values())).all()
@@ -115,19 +108,14 @@ def test_a_wrong_footprint_is_not_blamed_on_physics(tmp_path):
     campaign = small_campaign(tmp_path, **DOOR | {'seed': 22, 'truth': 'footprint:two_lobes'})
     diagnosis = diagnose(campaign, BASE, EFFECTS)
     assert diagnosis.verdict in ('none_missing', 'unknown_effect')
-    # What is learned names no effect.
     assert set(diagnosis.accepted) <= {'learned:footprint'}
     peak = diagnosis.to_dict()['footprint']['deviation_of_peak']
     assert peak == diagnosis.discrepancy.footprint_of_peak > 0.1
-    # A calibration says so, too.
     assert pd.calibrate(campaign).discrepancy.footprint_of_peak > 0.1
 
 
 def test_what_a_footprint_could_show_as_well_is_blamed_on_nothing_else(tmp_path):
-    """A draught displaces droplets with the square of the way: a footprint follows that closely.
-
-    On one door sprayed one way a draught, a tilted gun and a shifted part look alike.
-    """
+    """Displacement with the square of the way; a tilted gun and a shifted part look like it."""
     hidden = {'seed': 1, 'truth': 'air_drift~square', 'amplitude': 0.04, 'readings': 120}
     campaign = small_campaign(tmp_path, **DOOR | hidden)
     diagnosis = diagnose(campaign, BASE, EFFECTS)
@@ -138,44 +126,39 @@ def test_what_a_footprint_could_show_as_well_is_blamed_on_nothing_else(tmp_path)
 
 
 def test_an_effect_in_the_start_model_is_refitted_and_not_found_again(shielded):
-    start = pd.DepositionModel(effects=(FaradayShielding(shielding=0.1),))
-    diagnosis = diagnose(shielded, start, {'faraday_shielding': FaradayShielding})
+    start = pd.DepositionModel(effects=(SHIELDING(shielding=0.1),))
+    diagnosis = diagnose(shielded, start, {SHIELDING.id: SHIELDING})
     assert diagnosis.verdict == 'none_missing'
     assert diagnosis.accepted == ()
     assert diagnosis.model.effect('faraday_shielding').shielding == pytest.approx(0.35, abs=0.12)
 
 
-@pytest.mark.parametrize('points', [2, 11])
-def test_a_few_readings_are_too_few(clean, points):
-    few = clean.with_readings(clean.readings.select(clean.means.owner < points))
-    diagnosis = diagnose(pd.Campaign((few,)), BASE, {})
-    assert diagnosis.verdict == 'fit_broken'
-    assert f'{points} points cannot determine 7 parameters' in diagnosis.reason
-
-
-def test_a_path_that_misses_the_part_is_told(clean):
+def test_a_few_readings_are_too_few_and_a_path_that_misses_the_part_is_told(clean):
+    for points in (2, 11):
+        few = clean.with_readings(clean.readings.select(clean.means.owner < points))
+        diagnosis = diagnose(pd.Campaign((few,)), BASE, {})
+        assert diagnosis.verdict == 'fit_broken'
+        assert f'{points} points cannot determine 7 parameters' in diagnosis.reason
     off = clean.path.with_(flow=np.zeros(len(clean.path)))
     campaign = pd.Campaign((replace(clean, path=off),))
-    for diagnosis in (diagnose(campaign, BASE, {}), refit(campaign, BASE, FaradayShielding)):
+    for diagnosis in (diagnose(campaign, BASE, {}), refit(campaign, BASE, SHIELDING)):
         assert diagnosis.verdict == 'fit_broken'
         assert 'leaves 100 % of the points bare, where the gauge found paint' in diagnosis.reason
 
 
-@pytest.mark.parametrize(
-    ('probability', 'text'),
-    [(1.0, '> 99 %'), (0.9951, '> 99 %'), (0.97, '97 %'), (0.004, '< 1 %'), (0.0, '< 1 %')],
-)
-def test_no_probability_is_printed_as_certain(probability, text):
-    assert percent(probability) == text
+def test_no_probability_is_printed_as_certain():
+    told = [percent(probability) for probability in (1.0, 0.9951, 0.97, 0.004, 0.0)]
+    assert told == ['> 99 %', '> 99 %', '97 %', '< 1 %', '< 1 %']
 
 
 # Small panels that the model itself painted, and a library of three effects: a diagnosis is cheap.
-LIBRARY = {effect.id: effect for effect in (FogGradient, FlowDrift, AirDrift)}
+LIBRARY = {name: EFFECTS[name] for name in ('fog_gradient', 'flow_drift', 'air_drift')}
 
 
 def test_two_effects_are_found_each_with_a_step_that_improves_the_prediction():
     """On two panels, painted in opposite orders."""
-    truth = BASE.with_effect(FogGradient(fog_um=6.0)).with_effect(FlowDrift(drift_per_pass=0.1))
+    acting = EFFECTS['fog_gradient'](fog_um=6.0), EFFECTS['flow_drift'](drift_per_pass=0.1)
+    truth = pd.DepositionModel(effects=acting)
     found = diagnose(gauged(truth, seed=0, orders=ORDERS), BASE, LIBRARY)
     assert found.verdict == 'effect_missing'
     # A footprint that the readings learned beside them is no effect.
@@ -192,7 +175,6 @@ def test_two_effects_are_found_each_with_a_step_that_improves_the_prediction():
         errors = {'before': before.holdout_rmse_um, 'after': after.holdout_rmse_um}
         assert group.holdout_rmse_um == errors
     assert steps[-1].rmse_um < 1.2 * found.study.noise_floor_um
-    # Amounts of both are found together.
     assert {effect.id for effect in found.model.effects} == set(found.accepted)
     assert found.model.effect('fog_gradient').fog_um == pytest.approx(6.0, abs=1.2)
     assert found.model.effect('flow_drift').drift_per_pass == pytest.approx(0.1, abs=0.03)
@@ -217,7 +199,6 @@ def test_a_stripe_on_parts_painted_alike_is_unknown_with_its_place():
     assert 'of the width from the left' in unknown.where
     assert str(unknown) in found.reason
     assert 'Spray the same part another way' in found.reason
-    # The figures of the error belong together.
     rmse_um = found.to_dict()['rmse_um']
     for when in ('before', 'after'):
         square = rmse_um[f'beyond_noise_{when}'] ** 2 + rmse_um['noise_floor'] ** 2

@@ -53,12 +53,8 @@ def campaign() -> pd.Campaign:
     return gauged(pd.DepositionModel(effects=(HIDDEN,)), seed=3, orders=ORDERS)
 
 
-@pytest.fixture(scope='module')
-def done(campaign):
-    return refit(campaign, BASE, LEARNED['time_s'])
-
-
-def test_a_law_is_learned_with_its_band_and_counts_as_no_named_effect(done):
+def test_a_law_is_learned_with_its_band_and_its_file_reads_back_and_goes_on(campaign, tmp_path):
+    done = refit(campaign, BASE, LEARNED['time_s'])
     assert done.verdict == 'unknown_effect'
     assert done.accepted == ('learned:time_s',)
     (found,) = done.classes
@@ -70,7 +66,6 @@ def test_a_law_is_learned_with_its_band_and_counts_as_no_named_effect(done):
     before, after = done.history
     assert after.rmse_um < 0.8 * before.rmse_um
     assert after.rmse_um < after.holdout_rmse_um < 0.9 * before.holdout_rmse_um
-    # The band holds the hidden law up to a constant, and is much narrower than it.
     law = done.model.effect('learned:time_s')
     times = np.linspace(law.low, law.high, 50)
     sd = law.deviation(times)
@@ -78,9 +73,7 @@ def test_a_law_is_learned_with_its_band_and_counts_as_no_named_effect(done):
     away -= np.average(away, weights=sd**-2)
     assert np.mean(np.abs(away) < 1.96 * sd) > 0.9
     assert 1.96 * np.median(sd) < 0.25 * np.ptp(HIDDEN.factor(times))
-
-
-def test_the_model_written_reads_back_and_goes_on(done, campaign, tmp_path):
+    # The model that is written reads back and goes on.
     known = done.posterior, estimates(done.history[-1].fit)
     write_fitted(tmp_path / 'model.yaml', done.study, done.history, *known)
     file = read_model_file(tmp_path / 'model.yaml')
@@ -90,9 +83,6 @@ def test_the_model_written_reads_back_and_goes_on(done, campaign, tmp_path):
     assert [step['added'] for step in file.history] == ['pattern', 'learned:time_s']
     with pytest.raises(ModelError, match='learned:time_s is in the model already'):
         refit(campaign, file.model, LEARNED['time_s'])
-
-
-def test_what_does_not_vary_cannot_be_learned(campaign):
     panel = pd.Campaign(campaign.experiments[:1])
     with pytest.raises(ModelError, match='sky_view_factor is the same at all readings'):
         refit(panel, BASE, LEARNED['sky_view_factor'])
@@ -100,10 +90,8 @@ def test_what_does_not_vary_cannot_be_learned(campaign):
 
 def painted(folder, truth, part):
     """A campaign whose passes take brush 1 and the narrower brush 2 in turn, and its truth."""
-    made = generate(
-        5, truth, experiments=(part,), readings=90, repeats=24, second_brush=0.75,
-        parcels=2_000_000,
-    )  # fmt: skip
+    options = {'readings': 90, 'repeats': 24, 'second_brush': 0.75, 'parcels': 2_000_000}
+    made = generate(5, truth, experiments=(part,), **options)
     return pd.read_campaign(write(made, folder)), made.truth
 
 
@@ -116,7 +104,6 @@ def test_the_hidden_effect_is_named_and_the_error_falls(tmp_path, undrawn):
     gain = found.classes[0].parameters['gain']
     assert gain.low <= truth['hidden'][0]['amplitude'] <= gain.high
     error = found.to_dict()['rmse_um']
-    # Whole patches are left out, where the edge is and where it is not.
     assert error['holdout_after'] < 0.97 * error['holdout_before']
     assert error['after'] < error['noise_floor'] < error['before']
     pd.write(found, tmp_path / 'd')

@@ -31,9 +31,8 @@ class Twin(EFFECTS['edge_build']):
 
 
 def searching(campaign: pd.Campaign, *library: str) -> Search:
-    known = dict(EFFECTS) | {Twin.id: Twin}
-    library = {name: known[name] for name in library}
-    return Search(DiagnosisState.begin(campaign, BASE, library, seed=0))
+    known = {name: (EFFECTS | {Twin.id: Twin})[name] for name in library}
+    return Search(DiagnosisState.begin(campaign, BASE, known, seed=0))
 
 
 @pytest.fixture(scope='module')
@@ -105,10 +104,8 @@ def test_each_effect_of_the_set_is_sure_and_one_that_does_not_stand_is_taken_out
         # effect is accepted: the evidence counts for less, the prior does not.
         others = search.without(trial, name)
         rivals = dict.fromkeys((name, *others.proposed))
-        effect, unknown = (
-            model_space.log_odds(model_space.PRIOR_EFFECT),
-            model_space.log_odds(model_space.PRIOR_UNKNOWN),
-        )
+        priors = model_space.PRIOR_EFFECT, model_space.PRIOR_UNKNOWN
+        effect, unknown = map(model_space.log_odds, priors)
         gains = [search.with_effect(others, rival).log_evidence for rival in rivals]
         odds = (np.array(gains) - others.log_evidence) / model_space.COARSENED + effect
         gain = others.of_unknown.alone[UNKNOWN] - unknown

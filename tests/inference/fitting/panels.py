@@ -72,15 +72,9 @@ def readings_at(positions_m, film_um, noise_um=0.3, repeats=2, seed=0) -> pd.Rea
 
 
 def painted_by(
-    model: pd.DepositionModel,
-    motion: pd.Trajectory | SprayPath,
-    points_m: np.ndarray,
-    *,
-    surface: pd.Surface = PANEL,
-    name: str = 'panel',
-    texture: np.ndarray | float = 1.0,
-    **noise,
-) -> Experiment:
+    model: pd.DepositionModel, motion: pd.Trajectory | SprayPath, points_m: np.ndarray, *,
+    surface: pd.Surface = PANEL, name: str = 'panel', texture: np.ndarray | float = 1.0, **noise,
+) -> Experiment:  # fmt: skip
     """A panel that the model painted and a gauge measured, its film times a texture (N,)."""
     path = motion if isinstance(motion, SprayPath) else spray_path(motion)[0]
     integrator = FilmIntegrator(surface.at(points_m), model, 'double')
@@ -90,30 +84,18 @@ def painted_by(
 
 
 def gauged(
-    model: pd.DepositionModel,
-    seed: int,
-    columns: int = 3,
+    model: pd.DepositionModel, seed: int, columns: int = 3,
     orders: Sequence[Sequence[float]] = ORDERS[:1],
-) -> pd.Campaign:
-    """Panels painted by a model, two readings a point, with noise and texture as assumed.
-
-    Args:
-        seed: of noise and texture.
-        columns: of readings.
-        orders: heights of the passes on each panel, in their order [m].
-    """
+) -> pd.Campaign:  # fmt: skip
+    """Panels painted in these orders of heights [m], with noise and texture as assumed."""
     points_m = grid_m(columns, 20, 0.03, 1.97)
     panels = []
     for number, heights_m in enumerate(orders):
-        texture = np.random.default_rng([seed, 1 + number]).normal(
-            1.0, TEXTURE_SHARE, len(points_m)
-        )
-        panels.append(
-            painted_by(
-                model, passes(heights_m, samples=80), points_m, name=f'panel {number + 1}',
-                texture=texture, noise_um=0.7, seed=seed + 100 * number,
-            )
-        )  # fmt: skip
+        random = np.random.default_rng([seed, 1 + number])
+        noise = {'noise_um': 0.7, 'seed': seed + 100 * number}
+        noise |= {'texture': random.normal(1.0, TEXTURE_SHARE, len(points_m))}
+        motion, name = passes(heights_m, samples=80), f'panel {number + 1}'
+        panels.append(painted_by(model, motion, points_m, name=name, **noise))
     return pd.Campaign(tuple(panels))
 
 

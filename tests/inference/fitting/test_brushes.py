@@ -205,7 +205,7 @@ def spread(known: Posterior, model: pd.DepositionModel, first: str, second: str)
     return np.sqrt([covariance[i, i], covariance[j, j], apart]).tolist()
 
 
-def test_brushes_change_together_from_job_to_job():
+def test_brushes_change_together_and_a_job_of_one_rests_on_the_calibration_of_all():
     """Level and widths go with the paint and the cup; the brushes' ratio hardly changes."""
     known = of_brushes(known_of(TRUTH), TRUTH, TRUTH)
     one, other, apart = spread(known, TRUTH, 'brush_1.log_K1', 'brush_4.log_K1')
@@ -218,9 +218,6 @@ def test_brushes_change_together_from_job_to_job():
     assert one == other > 2.0
     assert apart == pytest.approx(np.sqrt(2.0 * (0.1**2 + 0.1 * 0.1**2)), rel=1e-6)
     assert of_brushes(None, pd.DepositionModel(), TRUTH) is None
-
-
-def test_a_job_of_one_brush_rests_on_the_calibration_of_all():
     second = TRUTH.of_numbers({4})
     known = of_brushes(known_of(TRUTH), TRUTH, second)
     assert known.names == tuple(c.name for c in PATTERN)

@@ -24,11 +24,10 @@ from virtual_paint_shop.shop import panel_study
 
 pytestmark = pytest.mark.slow
 
-TRUTH = pd.DepositionModel(
-    planar=PlanarPattern(
-        K1_cm3_per_s=1.6, K2=0.25, K3=0.25, phi_rad=0.0, r_m=0.2, sigma1_m=0.08, sigma2_m=0.14
-    )
+PLANAR = PlanarPattern(
+    K1_cm3_per_s=1.6, K2=0.25, K3=0.25, phi_rad=0.0, r_m=0.2, sigma1_m=0.08, sigma2_m=0.14
 )
+TRUTH = pd.DepositionModel(planar=PLANAR)
 HEIGHTS_M = (1.577, 1.0, 0.423)
 
 
@@ -107,8 +106,12 @@ def test_papers_study_fit_at_577_predict_525_and_625(tmp_path):
         assert residuals.sd_um < 1.2 * noise_um
 
 
-def with_film(panel, film_um, count=40, repeats=1, noise_um=0.0):
-    return panel.with_readings(readings_at(column()[:count], film_um, noise_um, repeats))
+def with_film(panel, film_um, repeats=1, noise_um=0.0):
+    places = column()[: len(film_um)]
+    return panel.with_readings(readings_at(places, film_um, noise_um, repeats))
+
+
+SIX = slice(10, 16)
 
 
 def in_unit(panel, factor, rows=slice(None)):
@@ -120,20 +123,15 @@ def in_unit(panel, factor, rows=slice(None)):
 @pytest.mark.parametrize(
     ('made', 'words'),
     [
-        (lambda panel: with_film(panel, panel.means.mean_um[:6], 6),
-         'readings at 6 points; .* measure at least 10'),
-        (lambda _: painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)),
-         'one side of the passes'),
-        (lambda panel: with_film(panel, np.full(40, 20.0), repeats=2, noise_um=0.7),
-         'no pattern in it'),
+        (lambda panel: with_film(panel, panel.means.mean_um[:6]), 'readings at 6 points; .* meas'),
+        (lambda _: painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)), 'one side of the'),
+        (lambda panel: with_film(panel, np.full(40, 20.0), 2, noise_um=0.7), 'no pattern in it'),
         (lambda panel: with_film(panel, np.where(np.arange(40) == 7, -4.5, panel.means.mean_um)),
          "point 'P7' reads -4.5 µm; .* zero the gauge"),
         (lambda panel: in_unit(panel, 25.4), 'look like mil, say unit: {thickness: mil}'),
         (lambda panel: in_unit(panel, 1000.0), 'look like mm, say unit: {thickness: mm}'),
-        (lambda panel: in_unit(panel, 25.4, slice(10, 16)),
-         r"6 of the readings in 'thickness_um'.* look like mil, multiply them by 25\.4 or"),
-        (lambda panel: in_unit(panel, 1000.0, slice(10, 16)),
-         '6 of the readings.* look like mm, multiply them by 1000'),
+        (lambda panel: in_unit(panel, 25.4, SIX), r'6 of .* like mil, multiply them by 25\.4'),
+        (lambda panel: in_unit(panel, 1000.0, SIX), '6 of .* like mm, multiply them by 1000'),
     ],
     ids=['few', 'one side', 'even', 'negative', 'mils', 'mm', 'six in mils', 'six in mm'],
 )  # fmt: skip
@@ -144,8 +142,6 @@ def test_readings_that_determine_nothing_or_are_in_another_unit_are_refused(pane
     assert re.search(words, str(refusal.value))
 
 
-# Panels too small for the pattern are noticed, and the uncertainty is made honest.
-
 WIDE = PlanarPattern(
     K1_cm3_per_s=1.6, K2=0.15, K3=0.2, phi_rad=0.6, r_m=0.22, sigma1_m=0.09, sigma2_m=0.15
 )
@@ -154,13 +150,10 @@ RIM_M = 0.015
 
 def panel_campaign(height_m: float, passes_m, *effects: EdgeBuild) -> pd.Campaign:
     """A panel measured across its whole height but for the rim."""
-    model, places = pd.DepositionModel(planar=WIDE, effects=effects), (RIM_M, height_m - RIM_M)
-    return pd.Campaign((
-        painted_by(
-            model, passes(passes_m), column(*places, 36), surface=panel_of(height_m, 0.05),
-            noise_um=0.5,
-        ),
-    ))  # fmt: skip
+    model, panel = pd.DepositionModel(planar=WIDE, effects=effects), panel_of(height_m, 0.05)
+    places = column(RIM_M, height_m - RIM_M, 36)
+    part = painted_by(model, passes(passes_m), places, surface=panel, noise_um=0.5)
+    return pd.Campaign((part,))
 
 
 @pytest.fixture(scope='module')
@@ -174,14 +167,12 @@ def covered(values) -> list[bool]:
     return [v.low <= getattr(WIDE, v.name) <= v.high for v in values if v.name in names]
 
 
-def test_paint_beyond_the_readings_is_that_of_the_normal_distribution():
+def test_paint_beyond_the_readings_is_that_of_the_normal_and_none_is_not_warned_of():
     """A pattern of one Gaussian leaves a Gaussian across the pass."""
     sigma_m = 0.2
     gaussian = pd.DepositionModel(planar=PlanarPattern(K2=1.0, K3=0.0, sigma2_m=sigma_m))
-    narrow, wide = (
-        painted_by(gaussian, passes((1.0,)), column(*ends), name=f'{ends}')
-        for ends in ((0.8, 1.3), (0.6, 1.4))
-    )
+    one_pass, ends = passes((1.0,)), ((0.8, 1.3), (0.6, 1.4))
+    narrow, wide = (painted_by(gaussian, one_pass, column(*e), name=f'{e}') for e in ends)
     (reach,) = short_reaches(pd.Campaign((narrow,)), gaussian)
     assert sorted(reach.ends_m) == pytest.approx([0.2, 0.3], abs=1e-6)
     expected = norm.sf(np.array(reach.ends_m) / sigma_m)
@@ -189,9 +180,6 @@ def test_paint_beyond_the_readings_is_that_of_the_normal_distribution():
     assert reach.needed_m == pytest.approx(norm.isf(0.025) * sigma_m, rel=1e-3)
     for enough in ((wide,), (narrow, wide)):
         assert short_reaches(pd.Campaign(enough), gaussian) == ()
-
-
-def test_a_panel_that_shows_both_edges_is_not_warned_of():
     result = calibrate(panel_campaign(1.4, (0.7,)))
     assert not any('lands further out' in warning for warning in result.warnings)
     assert len(result.shifts) == 0
@@ -214,9 +202,7 @@ def test_a_panel_too_small_is_named_and_the_widened_intervals_hold_the_truth(sma
     file = read_model_file(tmp_path / 'model.yaml')
     np.testing.assert_allclose(file.posterior.matrix, found.posterior.matrix, rtol=1e-6)
     assert file.uncertainty['planar']['r_m'] == pytest.approx(widths['r_m'], rel=0.01)
-
-
-def test_a_comparison_with_a_pattern_fitted_to_such_a_panel_warns(small):
+    # A comparison with a pattern that was fitted to such a panel warns, too.
     (warning,) = pd.compare(small).warnings
     assert 'the edges of the pattern are extrapolated' in warning
     assert pd.compare(small, pd.DepositionModel(planar=WIDE)).warnings == ()

@@ -10,13 +10,9 @@ from inference.fitting.panels import ORDERS, column, grid_m, painted_by, passes,
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.state import trouble_with
-from paint_deposition.inference.fitting import cleaning
+from paint_deposition.inference.fitting import cleaning, outliers
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.inference.fitting.outliers import (
-    FittedPoints,
-    Outlier,
-    find_outliers,
-)
+from paint_deposition.inference.fitting.outliers import FittedPoints, find_outliers
 from paint_deposition.report.words import count_words
 from small_campaign import small_campaign
 
@@ -72,20 +68,14 @@ def test_a_slip_is_found_whatever_is_missing(missing, by_um):
     assert list(find_outliers(slipped(misfit, row, by_um), EVERY)) == [row]
 
 
-@pytest.mark.parametrize(
-    ('rows', 'found'), [((3, 30, 60), {3, 30, 60}), (range(0, 96, 10), set())]
-)
-def test_slips_do_not_hide_each_other_and_many_are_none(rows, found):
+def test_slips_do_not_hide_each_other_and_many_and_those_read_again_are_none():
     """Where a tenth of all readings is off, the model is at fault and not the pen."""
-    misfit = scattered(1)
-    for row in rows:
-        misfit = slipped(misfit, row, 9.0 * FILM_UM)
-    assert set(find_outliers(misfit, EVERY)) == found
-
-
-def test_a_point_that_was_read_again_is_no_slip():
-    again = EVERY.copy()
-    again[5] = False
+    for rows, found in (((3, 30, 60), {3, 30, 60}), (range(0, 96, 10), set())):
+        misfit = scattered(1)
+        for row in rows:
+            misfit = slipped(misfit, row, 9.0 * FILM_UM)
+        assert set(find_outliers(misfit, EVERY)) == found
+    again = np.arange(COUNT) != 5
     assert find_outliers(slipped(scattered(2), 5, 9.0 * FILM_UM), again) == {}
 
 
@@ -106,7 +96,7 @@ def test_a_prediction_without_the_reading_is_that_of_the_others_alone():
     [(312.0, 30.4, 31.2), (3.12, 30.4, 31.2), (13.2, 30.9, 31.2), (0.2, 30.4, None)],
 )
 def test_what_was_probably_meant(written, expected, guess):
-    outlier = Outlier('door: P7', written, expected, 0.9)
+    outlier = outliers.Outlier('door: P7', written, expected, 0.9)
     assert outlier.guess_um == (None if guess is None else pytest.approx(guess))
     assert f"point 'door: P7': {written:.4g} µm" in str(outlier)
     assert ('?' in str(outlier)) == (guess is not None)
@@ -150,17 +140,14 @@ def test_a_thick_film_without_texture_is_no_broken_fit():
     film = even.readings.thickness_um * 80.0 / even.readings.thickness_um.mean()
     readings = film + 0.5 * np.random.default_rng(8).normal(size=len(film))
     stated = pd.Readings.of(at, readings, sigma_um=np.full(len(film), 0.5))
-    study, fit = cleaning.clean_and_fit(
-        pd.Campaign((even.with_readings(stated),)), MODEL, starts=1
-    )
+    campaign = pd.Campaign((even.with_readings(stated),))
+    study, fit = cleaning.clean_and_fit(campaign, MODEL, starts=1)
     assert trouble_with(study, fit) == ''
     assert study.estimated_texture < 0.004
     assert study.noise_figures['texture_source'] == 'neighbours'
     (note,) = study.notes
     assert note.startswith("The film's own texture is 0.")
-
-
-def test_an_assumed_noise_leaves_the_texture_assumed():
+    # An assumed noise leaves the texture assumed.
     experiment = painted_by(MODEL, passes([0.55, 1.35]), grid_m(), repeats=1)
     study, _ = cleaning.clean_and_fit(pd.Campaign((experiment,)), MODEL, starts=1)
     assert study.texture_share == 0.01
@@ -170,16 +157,12 @@ def test_an_assumed_noise_leaves_the_texture_assumed():
 NOISE_UM, SCANNED = 0.4, 6000
 
 
-@pytest.fixture(scope='module')
-def scan() -> pd.Campaign:
-    """A panel read at random places, denser than any cell."""
+def test_the_mean_of_a_cell_is_its_film_and_readings_by_hand_beside_a_scan_are_kept():
+    """A panel is read at random places, denser than any cell."""
     places = np.random.default_rng(5).uniform((-0.35, 0.05), (0.35, 1.95), (SCANNED, 2))
     points_m = np.column_stack([places[:, 0], np.zeros(SCANNED), places[:, 1]])
-    motion = passes(ORDERS[0], samples=80)
-    return pd.Campaign((painted_by(MODEL, motion, points_m, noise_um=NOISE_UM, repeats=1),))
-
-
-def test_the_mean_of_a_cell_is_the_film_at_its_middle_within_the_noise_of_a_mean(scan):
+    motion, noise = passes(ORDERS[0], samples=80), {'noise_um': NOISE_UM, 'repeats': 1}
+    scan = pd.Campaign((painted_by(MODEL, motion, points_m, **noise),))
     # Off by a tenth of the film, as a rough fit may be.
     planar = MODEL.planar.model_copy(update={'K1_cm3_per_s': 1.1 * MODEL.planar.K1_cm3_per_s})
     cells = cleaning.condensed(scan, MODEL.model_copy(update={'planar': planar}))
@@ -191,9 +174,6 @@ def test_the_mean_of_a_cell_is_the_film_at_its_middle_within_the_noise_of_a_mean
     # Chi-square of that many cells: within five of its standard deviations.
     five_sd = 5.0 * np.sqrt(2.0 / len(cells))
     assert np.mean((off_um / sigma_um) ** 2) == pytest.approx(1.0, abs=five_sd)
-
-
-def test_a_few_readings_by_hand_beside_a_scan_are_kept_and_what_became_of_it_is_said(scan):
     motion = passes(ORDERS[1], samples=80)
     hand = painted_by(MODEL, motion, column(), name='by hand', noise_um=NOISE_UM)
     study = pd.compare(pd.Campaign((*scan.experiments, hand)), MODEL).study

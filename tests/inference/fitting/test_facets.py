@@ -45,12 +45,8 @@ def study(edge_m: float) -> Study:
     return clean_and_fit(pd.Campaign((measured(edge_m),)), MODEL)[0]
 
 
-@pytest.fixture(scope='module')
-def coarse() -> Study:
-    return study(COARSE_M)
-
-
-def test_facets_of_a_coarse_mesh_are_noise_which_points_keep_and_a_fine_one_has_none(coarse):
+def test_facets_of_a_coarse_mesh_are_noise_which_points_keep_and_a_fine_one_has_none():
+    coarse = study(COARSE_M)
     assert any('The mesh of fold is coarser' in note for note in coarse.notes)
     assert coarse.nuisance.shape == (len(coarse), 0)
     without = replace(coarse, facet_um=None)
@@ -62,10 +58,7 @@ def test_facets_of_a_coarse_mesh_are_noise_which_points_keep_and_a_fine_one_has_
     fine = study(FINE_M)
     assert fine.facet_um is None
     assert not any('coarser' in note for note in fine.notes)
-
-
-def test_the_noise_is_what_the_facets_cost(coarse):
-    """The model is the true one: what is left of the readings is noise and facets."""
+    # The model is the true one: what is left of the readings is noise and facets.
     left_um = coarse.measured_um - coarse.forward.predict_um(MODEL)
     amount = left_um @ coarse.facet_um / (coarse.facet_um @ coarse.facet_um)
     assert 0.5 < amount < 1.5

@@ -8,9 +8,6 @@ from hypothesis import strategies as st
 import paint_deposition as pd
 from inference.fitting.panels import PANEL, column, grid_m, painted_by, passes
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
-from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
-from paint_deposition.effects.library.overspray_fog import OversprayFog
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.forward import Forward
@@ -22,11 +19,10 @@ from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import spray_path
 
 BASE = pd.DepositionModel()
-TRUTH = pd.DepositionModel(
-    planar=PlanarPattern(
-        K1_cm3_per_s=1.6, K2=0.3, K3=0.25, phi_rad=0.9, r_m=0.17, sigma1_m=0.07, sigma2_m=0.12
-    )
+PLANAR = PlanarPattern(
+    K1_cm3_per_s=1.6, K2=0.3, K3=0.25, phi_rad=0.9, r_m=0.17, sigma1_m=0.07, sigma2_m=0.12
 )
+TRUTH = pd.DepositionModel(planar=PLANAR)
 SIGMA_UM = 0.15
 
 
@@ -40,7 +36,7 @@ def spotted() -> pd.Campaign:
 
 @pytest.fixture(scope='module')
 def forward(spotted):
-    return Forward(spotted, (OversprayFog(),))
+    return Forward(spotted, (EFFECTS['overspray_fog'](),))
 
 
 @pytest.fixture(scope='module')
@@ -49,17 +45,13 @@ def exact(forward):
     return forward.predict_um(TRUTH)
 
 
-def test_the_forward_model_is_the_film_at_the_readings(spotted, exact):
+def test_readings_without_noise_are_the_film_and_give_the_pattern_back(spotted, exact, forward):
     integrator = FilmIntegrator(PANEL.at(grid_m()), TRUTH, 'double')
     integrator.add(spotted.experiments[0].path)
     assert exact == pytest.approx(integrator.film_um, rel=1e-9)
     assert 5.0 < exact.max() < 100.0
-
-
-def test_a_known_pattern_comes_back_from_readings_without_noise(forward, exact):
-    fit = fit_readings(
-        forward, exact, np.full(len(exact), 0.003), FreeParameters.of(BASE), starts=6
-    )
+    sigma_um = np.full(len(exact), 0.003)
+    fit = fit_readings(forward, exact, sigma_um, FreeParameters.of(BASE), starts=6)
     assert fit.converged
     assert fit.chi_square < 1.0
     for name, value in TRUTH.planar:
@@ -67,7 +59,7 @@ def test_a_known_pattern_comes_back_from_readings_without_noise(forward, exact):
 
 
 def test_derivatives_are_those_of_the_prediction(forward, exact):
-    parameters = FreeParameters.of(TRUTH, OversprayFog(fog_um=0.5))
+    parameters = FreeParameters.of(TRUTH, EFFECTS['overspray_fog'](fog_um=0.5))
     vector = parameters.encode(parameters.start)
     found = derivatives(forward, parameters, vector, np.full(len(exact), SIGMA_UM))
     for k in range(len(vector)):
@@ -116,7 +108,6 @@ def test_nuisance_directions_are_allowed_for(forward, exact):
     truth = parameters.encode(TRUTH)
     assert np.linalg.norm(lenient.vector - truth) < 0.5 * np.linalg.norm(strict.vector - truth)
     assert lenient.marginal.chi_square < 0.2 * strict.chi_square
-    # The discrepancy is the same as a covariance.
     discrepancy = nuisance @ nuisance.T
     same = fit_readings(forward, wrong, sigma, parameters, discrepancy=discrepancy)
     assert same.vector == pytest.approx(lenient.vector, abs=1e-6)
@@ -129,9 +120,8 @@ def test_a_point_is_as_certain_as_its_repeats_and_the_films_texture():
     assert study.noise.source == 'repeats'
     assert study.noise.degrees_of_freedom == 3 * len(study)
     gauge = study.noise.sigma_um[: len(study)]
-    assert study.sigma_um == pytest.approx(
-        np.sqrt(gauge**2 / 4 + (TEXTURE_SHARE * study.measured_um) ** 2), rel=0.02
-    )
+    expected = np.hypot(gauge / 2, TEXTURE_SHARE * study.measured_um)
+    assert study.sigma_um == pytest.approx(expected, rel=0.02)
     assert study.nuisance.shape == (len(study), 0)
 
 
@@ -149,7 +139,7 @@ def test_a_prediction_does_not_depend_on_what_was_predicted_before(forward):
     """Films and prepared paths are kept, but for models of the same path and flux only."""
     effects = [EFFECTS[name].typical() for name in ('tcp_tilt', 'overspray_fog', 'occlusion')]
     models = [TRUTH.with_effect(effect) for effect in effects]
-    models += [TRUTH.with_effect(AirDrift(shift_down_m=0.002 * k)) for k in range(12)]
+    models += [TRUTH.with_effect(EFFECTS['air_drift'](shift_down_m=0.002 * k)) for k in range(12)]
     models += [TRUTH.model_copy(update={'projection': Projection(model_plane_m=0.25)}), TRUTH]
     alone = [Forward(forward.campaign).predict_um(model) for model in models]
     # No drift, and no shadow: these two are that of the last.
@@ -165,9 +155,8 @@ def test_a_model_without_a_law_of_the_study_does_not_have_it():
     law = LEARNED['incidence_deg'](low=0.0, high=60.0, learned=(0.1, 0.4))
     campaign = pd.Campaign((painted_by(BASE, passes([0.7, 1.3]), column(0.5, 1.5, 9)),))
     other = pd.DepositionModel(effects=(EFFECTS['pattern_spread'].typical(),))
-    np.testing.assert_array_equal(
-        Forward(campaign, (law,)).predict_um(other), Forward(campaign).predict_um(other)
-    )
+    alone = Forward(campaign).predict_um(other)
+    np.testing.assert_array_equal(Forward(campaign, (law,)).predict_um(other), alone)
 
 
 PATTERNS = st.builds(
@@ -179,10 +168,9 @@ PATTERNS = st.builds(
 
 @given(PATTERNS, st.floats(-0.1, 0.1), st.floats(0.0, 2.0))
 def test_a_model_survives_the_way_there_and_back(planar, shift_m, gain):
-    model = pd.DepositionModel(
-        planar=planar,
-        effects=(AirDrift(shift_across_m=shift_m), CornerSlowdown(gain=gain, length_m=0.2)),
-    )
+    slowdown = EFFECTS['corner_slowdown'](gain=gain, length_m=0.2)
+    effects = EFFECTS['air_drift'](shift_across_m=shift_m), slowdown
+    model = pd.DepositionModel(planar=planar, effects=effects)
     parameters = FreeParameters.of(model, *model.effects)
     again = parameters.decode(parameters.encode(model))
     for name, value in planar:
@@ -193,28 +181,23 @@ def test_a_model_survives_the_way_there_and_back(planar, shift_m, gain):
     assert again.projection == model.projection
 
 
-def test_shapes_are_varied_on_a_logarithmic_scale():
+def test_shapes_are_varied_on_a_logarithmic_scale_and_a_learned_law_not_at_all():
     """Neutral is the centre; the whole physical range is a few widths of the prior."""
-    parameters = FreeParameters.of(pd.DepositionModel(), CornerSlowdown(gain=0.5))
+    parameters = FreeParameters.of(pd.DepositionModel(), EFFECTS['corner_slowdown'](gain=0.5))
     assert parameters.varied == (('corner_slowdown', 'gain'), ('corner_slowdown', 'length_m'))
     vector = parameters.encode(parameters.start)
-    info = CornerSlowdown.parameters()['length_m']
-    lengths = []
-    for entry in (-0.5, 0.0, 0.5):
-        vector[-1] = entry
-        effect = parameters.decode(vector).effect('corner_slowdown')
-        assert effect.gain == pytest.approx(0.5)
-        lengths.append(effect.length_m)
-    assert lengths[1] == pytest.approx(info['neutral'])
-    assert lengths[2] / lengths[1] == pytest.approx(lengths[1] / lengths[0])
-    assert lengths[2] > lengths[0]
+    info = EFFECTS['corner_slowdown'].parameters()['length_m']
+    vectors = [np.append(vector[:-1], entry) for entry in (-0.5, 0.0, 0.5)]
+    effects = [parameters.decode(each).effect('corner_slowdown') for each in vectors]
+    assert [effect.gain for effect in effects] == pytest.approx([0.5] * 3)
+    low, middle, high = (effect.length_m for effect in effects)
+    assert middle == pytest.approx(info['neutral'])
+    assert high / middle == pytest.approx(middle / low)
+    assert high > low
     low, high = parameters.bounds
     assert high[-1] - low[-1] == pytest.approx(SHAPE_DEVIATIONS)
     ends = [parameters.decode(end).effect('corner_slowdown').length_m for end in (low, high)]
     assert ends == pytest.approx([info['low'], info['high']])
-
-
-def test_a_learned_law_has_nothing_to_vary():
     law = LEARNED['time_s'](low=0.0, high=9.0, learned=(0.1, 0.0, -0.1))
     parameters = FreeParameters.of(pd.DepositionModel(), law)
     assert len(parameters) == len(PATTERN)

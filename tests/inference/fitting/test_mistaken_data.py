@@ -7,7 +7,8 @@ import pytest
 
 import paint_deposition as pd
 from inference.fitting.panels import gauged, reading
-from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.part.zones import Box, PointZones, Zone
@@ -63,17 +64,8 @@ def panels() -> pd.Campaign:
     return gauged(MODEL, 3, orders=ORDERS)
 
 
-@pytest.fixture
-def first(panels) -> Experiment:
-    return panels.experiments[0]
-
-
-@pytest.fixture
-def second(panels) -> Experiment:
-    return panels.experiments[1]
-
-
-def test_sound_readings_are_not_accused(panels, first, second):
+def test_sound_readings_are_not_accused(panels):
+    first, second = panels.experiments
     assert said(panels) == said(panels, GIVEN) == ()
     # The passes run straight across the panels: left and right have the same film.
     assert said(of(mirrored(first, 0, 0.0), mirrored(second, 0, 0.0))) == ()
@@ -84,7 +76,8 @@ def test_sound_readings_are_not_accused(panels, first, second):
     assert said(of(replace(off, switched_off=frozenset({'voltage'})), other)) == ()
 
 
-def test_readings_of_one_panel_or_of_all_upside_down(first, second):
+def test_readings_of_one_panel_or_of_all_upside_down(panels):
+    first, second = panels.experiments
     (one,) = said(of(mirrored(first), second))
     assert 'the readings of panel 1 look mirrored top to bottom' in one
     (every,) = said(of(mirrored(first), mirrored(second)))
@@ -93,26 +86,22 @@ def test_readings_of_one_panel_or_of_all_upside_down(first, second):
 
 
 @pytest.mark.parametrize(
-    ('name', 'values'),
-    [
-        ('air_drift', {'shift_down_m': 0.06}),
-        ('air_drift', {'shift_across_m': 0.08}),
-        ('flow_drift', {'drift_per_pass': 0.2}),
-    ],
+    'effect',
+    [AirDrift(shift_down_m=0.06), AirDrift(shift_across_m=0.08), FlowDrift(drift_per_pass=0.2)],
 )
-def test_an_effect_is_no_mistake(name, values):
+def test_an_effect_is_no_mistake(effect):
     """A strong draught moves the film as a mirror about another plane would."""
     nearly_even = ((0.37, 0.97, 1.57), (0.40, 1.0, 1.60))
     for orders in (ORDERS, nearly_even):
-        model = MODEL.with_effect(EFFECTS[name](**values))
-        assert said(gauged(model, 5, orders=orders)) == ()
+        assert said(gauged(MODEL.with_effect(effect), 5, orders=orders)) == ()
 
 
 @pytest.mark.parametrize(
     ('factor', 'words'),
     [(10.0, 'ten times too large'), (0.1, 'ten times too small'), (25.4, 'taken for mils')],
 )
-def test_readings_in_another_unit(first, second, factor, words):
+def test_readings_in_another_unit(panels, factor, words):
+    first, second = panels.experiments
     (every,) = said(of(scaled(first, factor), scaled(second, factor)), GIVEN)
     assert every.startswith('the readings look ')
     assert words in every
@@ -121,9 +110,9 @@ def test_readings_in_another_unit(first, second, factor, words):
     assert words in one
 
 
-def test_a_target_tells_the_unit_where_the_film_alone_does_not(first, second):
+def test_a_target_tells_the_unit_where_the_film_alone_does_not(panels):
     """100 µm of film may be meant; where 30 are wanted, they are not."""
-    tenfold = of(scaled(first, 10.0), scaled(second, 10.0))
+    tenfold = of(*(scaled(part, 10.0) for part in panels.experiments))
     mean_um = tenfold.means.mean_um.mean()
     assert said(replace(tenfold, target_um=mean_um / 10.0, tolerance_um=3.0))
     assert said(replace(tenfold, target_um=mean_um, tolerance_um=30.0)) == ()
@@ -135,7 +124,8 @@ def test_a_model_of_another_gun_is_named_and_does_not_stop(panels):
     assert not stops
 
 
-def test_a_comparison_warns_of_mirrored_and_names_swapped_readings_once(first, second):
+def test_a_comparison_warns_of_mirrored_and_names_swapped_readings_once(panels):
+    first, second = panels.experiments
     bad, labels = swapped(first)
     found = pd.compare(of(bad, mirrored(second)))
     assert found.warnings[0].startswith('the readings of panel 2 look mirrored top to bottom: ')
@@ -145,12 +135,12 @@ def test_a_comparison_warns_of_mirrored_and_names_swapped_readings_once(first, s
     assert all(f"'{label}'" in line for label in labels)
 
 
-def test_a_diagnosis_stops_at_exchanged_readings(first, second):
-    first, second = (
-        part.with_readings(replace(part.readings, source=f'{part.name}.csv'))
-        for part in (first, second)
+def test_a_diagnosis_stops_at_exchanged_readings(panels):
+    parts = panels.experiments
+    named = (replace(part.readings, source=f'{part.name}.csv') for part in parts)
+    found = pd.diagnose(
+        exchanged(*(p.with_readings(r) for p, r in zip(parts, named, strict=True)))
     )
-    found = pd.diagnose(exchanged(first, second))
     assert found.verdict == 'fit_broken'
     assert 'the readings of panel 1 and panel 2 look exchanged: ' in found.reason
     assert 'pair them the other way round in the campaign' in found.reason

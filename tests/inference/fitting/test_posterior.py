@@ -11,14 +11,10 @@ from inference.diagnosis.linear import KNOWN, PARAMETERS, correlated, linear_fit
 from inference.fitting.panels import painted_by, passes
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.errors import ModelError
+from paint_deposition.inference.fitting import posterior as jobs
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
-from paint_deposition.inference.fitting.posterior import (
-    PatternShift,
-    draw_models,
-    posterior_of,
-    prior_for,
-)
+from paint_deposition.inference.fitting.posterior import PatternShift, draw_models, posterior_of
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import EFFECT_BETWEEN_JOBS, PATTERN
 
@@ -26,14 +22,14 @@ WITH_EFFECT = FreeParameters.of(pd.DepositionModel(), CornerSlowdown(gain=0.5, l
 
 
 @pytest.fixture(scope='module')
-def panel() -> Experiment:
+def campaign() -> pd.Campaign:
     grid = np.array([[0.1 * k, 0.0, 1.0] for k in range(-3, 4)])
-    return painted_by(pd.DepositionModel(), passes([1.0]), grid)
+    return pd.Campaign((painted_by(pd.DepositionModel(), passes([1.0]), grid),))
 
 
-@pytest.fixture(scope='module')
-def campaign(panel) -> pd.Campaign:
-    return pd.Campaign((panel,))
+@pytest.fixture
+def panel(campaign) -> Experiment:
+    return campaign.experiments[0]
 
 
 def thicker(panel: Experiment, **settings) -> pd.Campaign:
@@ -51,21 +47,17 @@ def test_the_posterior_of_a_job_is_the_prior_of_the_next_widened(parameters, cam
     between = [c.between_jobs for c in PATTERN]
     between += [EFFECT_BETWEEN_JOBS] * (len(parameters) - len(PATTERN))
     assert prior.centre == pytest.approx(fit.vector)
-    assert prior.factor @ prior.factor.T == pytest.approx(
-        scaled_covariance(fit) + np.diag(np.square(between)), rel=1e-6, abs=1e-12
-    )
+    widened = scaled_covariance(fit) + np.diag(np.square(between))
+    assert prior.factor @ prior.factor.T == pytest.approx(widened, rel=1e-6, abs=1e-12)
 
 
-def test_effects_are_told_in_their_own_units(campaign):
+def test_effects_are_told_in_their_own_units_and_the_unknown_keeps_its_weak_prior(campaign):
     fit = linear_fit(np.random.default_rng(2), 60, parameters=WITH_EFFECT)
     vector = WITH_EFFECT.encode(WITH_EFFECT.start)
     told = posterior_of(replace(fit, vector=vector), campaign).mean
     assert told['corner_slowdown.gain'] == pytest.approx(0.5)
     assert np.exp(told['corner_slowdown.log_length_m']) == pytest.approx(0.2)
     assert np.exp(told['log_K1']) == pytest.approx(pd.DepositionModel().planar.K1_cm3_per_s)
-
-
-def test_what_nothing_is_known_of_keeps_its_weak_prior():
     both = replace(WITH_EFFECT, known=correlated(PARAMETERS)).prior
     alone = KNOWN.prior
     count = len(PATTERN)
@@ -75,33 +67,28 @@ def test_what_nothing_is_known_of_keeps_its_weak_prior():
     assert not both.factor[count:, :count].any()
 
 
-def test_no_reading_counts_twice(panel, campaign):
+def test_no_reading_counts_twice_and_other_settings_of_the_process_are_told(panel, campaign):
     fit = linear_fit(np.random.default_rng(4), 60)
     posterior = posterior_of(fit, campaign)
     assert posterior.readings == (panel.taken.fingerprint,)
-    known, remarks = prior_for(posterior, campaign)
+    known, remarks = jobs.prior_for(posterior, campaign)
     assert known is None
     assert 'panel' in remarks[0]
     other = thicker(panel)
-    assert prior_for(posterior, other) == (posterior, ())
-    assert prior_for(None, campaign) == (None, ())
+    assert jobs.prior_for(posterior, other) == (posterior, ())
+    assert jobs.prior_for(None, campaign) == (None, ())
     later = replace(fit, parameters=replace(fit.parameters, known=posterior))
     (added,) = (part.taken.fingerprint for part in other.experiments)
     assert posterior_of(later, other).readings == (*posterior.readings, added)
-
-
-def test_other_settings_of_the_process_are_told(panel):
     calibrated = pd.Campaign((replace(panel, settings={'voltage_kv': 60.0, 'flow': 1.0}),))
     posterior = posterior_of(linear_fit(np.random.default_rng(4), 60), calibrated)
     assert posterior.process == {'voltage_kv': 60.0, 'flow': 1.0}
-    known, (remark,) = prior_for(posterior, thicker(panel, voltage_kv=0.0, flow=1.01))
+    known, (remark,) = jobs.prior_for(posterior, thicker(panel, voltage_kv=0.0, flow=1.01))
     assert known == posterior
     assert 'calibrated at voltage_kv 60, this job was painted at 0:' in remark
     for settings in ({'voltage_kv': 61.0}, {}):
-        assert prior_for(posterior, thicker(panel, **settings)) == (posterior, ())
+        assert jobs.prior_for(posterior, thicker(panel, **settings)) == (posterior, ())
 
-
-# How far a pattern moved from the calibration.
 
 FIT = linear_fit(np.random.default_rng(0), 20, parameters=KNOWN)
 PRIOR = KNOWN.prior
@@ -163,13 +150,10 @@ def test_draws_near_a_bound_follow_the_truncated_normal():
         assert values.std() == pytest.approx(told.std(), rel=4.0 / (2 * COUNT) ** 0.5)
 
 
-def test_the_asymmetry_of_a_draw_is_at_most_one():
+def test_a_draw_is_within_its_bounds_or_refused():
     wide = known({'K3_cos_phi': 0.7}, {'K3_cos_phi': 0.3, 'K3_sin_phi': 0.6})
     asymmetry = np.array([model.planar.K3 for model in draw_models(MODEL, wide, COUNT, seed=2)])
     assert len(np.unique(asymmetry)) == COUNT
     assert asymmetry.max() <= 1.0
-
-
-def test_a_posterior_that_is_nowhere_physical_is_refused():
     with pytest.raises(ModelError, match='posterior: of 1000 draws 0 are within the bounds'):
         draw_models(MODEL, known({'K2': -0.5}, {'K2': 0.01}), 1, seed=3)

@@ -7,18 +7,13 @@ import pytest
 
 import paint_deposition as pd
 from inference.diagnosis.linear import fit_linear
+from inference.diagnosis.readings_on_door import study_of
 from inference.fitting.panels import gauged, grid_m, painted_by, passes, reading
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.inference.diagnosis.verdict import Step
+from paint_deposition.inference.fitting import random_effects as effects
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
-from paint_deposition.inference.fitting.random_effects import (
-    LEVEL_SHARE,
-    OTHER_LEVEL_SHARE,
-    SESSION_UM,
-    amounts,
-    random_effects,
-)
+from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM, amounts
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import root_mean_square
@@ -29,13 +24,8 @@ def part(name: str, session: str | np.ndarray = '') -> Experiment:
     """Read from the middle of the pass to where hardly any paint arrives."""
     places = grid_m(4, 10, 1.0, 1.5)
     one = painted_by(pd.DepositionModel(), passes([1.0]), places, name=name)
-    return one.with_readings(
-        replace(one.readings, session=np.broadcast_to(session, len(one.readings)))
-    )
-
-
-def study_of(*parts: Experiment) -> Study:
-    return Study.of(pd.Campaign(parts))
+    sessions = np.broadcast_to(session, len(one.readings))
+    return one.with_readings(replace(one.readings, session=sessions))
 
 
 def estimated(study: Study, change_um: np.ndarray) -> dict:
@@ -63,18 +53,24 @@ def test_a_level_and_a_zero_come_back_with_their_uncertainty():
     assert f'{level}'.startswith(f'part level of left: +{level.value:.2f} ± ')
     # The one residual is beside these levels; what all parts have in common is the model's.
     film_um = study.measured_um
-    assert study.residuals((1.0 - 0.03 * sign) * film_um).rmse_um < 0.006 * np.sqrt(
-        np.mean(film_um**2)
-    )
+    left = study.residuals((1.0 - 0.03 * sign) * film_um)
+    assert left.rmse_um < 0.006 * root_mean_square(film_um)
     assert study.residuals(0.97 * film_um).residual_um == pytest.approx(0.03 * film_um)
 
 
-def test_sessions_run_across_parts_and_those_without_a_name_are_their_own():
+def test_sessions_run_across_parts_and_two_on_one_part_differ_by_their_zero():
     study = study_of(part('left', 'Monday'), part('right', 'Monday'), part('roof'))
     level, zero = study.random_effects
     assert level.names == ('left', 'right', 'roof')
     assert zero.names == ('Monday', 'roof')
     assert study.nuisance.shape == (len(study), 5)
+    evening = np.arange(40) % 2 == 0
+    study = study_of(part('door', np.tile(np.where(evening, 'evening', 'noon'), 2)))
+    (zero,) = study.random_effects
+    assert zero.kind == 'gauge zero'
+    found = estimated(study, np.where(evening, 0.5, -0.5))
+    assert found['gauge zero', 'evening'].value == pytest.approx(0.5, abs=0.1)
+    assert found['gauge zero', 'noon'].is_notable
 
 
 def test_a_part_without_voltage_has_a_level_of_its_own():
@@ -83,7 +79,7 @@ def test_a_part_without_voltage_has_a_level_of_its_own():
     first, other = level.columns.T
     assert not first.any()  # there is no other part that it could differ from
     rows = study.campaign.experiment_of == 1
-    share = OTHER_LEVEL_SHARE * study.measured_um / study.sigma_um
+    share = effects.OTHER_LEVEL_SHARE * study.measured_um / study.sigma_um
     np.testing.assert_allclose(other, np.where(rows, share, 0.0))
     double = study.residuals(study.measured_um * np.where(rows, 2.0, 1.0))
     np.testing.assert_allclose(double.predicted_um, study.measured_um, rtol=0.02)
@@ -94,33 +90,21 @@ def test_a_part_without_voltage_has_a_level_of_its_own():
 def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves():
     study = study_of(part('left'), part('roof'), part('right'))
     owner = study.campaign.experiment_of
-    level, zero = random_effects(study.campaign, study.measured_um, study.sigma_um, owner != 1)
+    known = study.campaign, study.measured_um, study.sigma_um
+    level, zero = effects.random_effects(*known, owner != 1)
     others = np.array([[0.5, 0.0, -0.5], [0.0, 0.0, 0.0], [-0.5, 0.0, 0.5]])
     assert level.mixing == pytest.approx(100.0 * LEVEL_SHARE * others)
     assert not level.columns[owner == 1].any()
     # Its readings without a name of their session were taken in one of their own.
     assert zero.mixing == pytest.approx(SESSION_UM * others)
-    # One that is left has nothing that it could differ from.
-    assert random_effects(study.campaign, study.measured_um, study.sigma_um, owner == 0) == ()
+    assert effects.random_effects(*known, owner == 0) == ()
 
-
-def test_two_sessions_on_one_part_differ_by_their_zero():
-    evening = np.arange(40) % 2 == 0
-    study = study_of(part('door', np.tile(np.where(evening, 'evening', 'noon'), 2)))
-    (zero,) = study.random_effects
-    assert zero.kind == 'gauge zero'
-    found = estimated(study, np.where(evening, 0.5, -0.5))
-    assert found['gauge zero', 'evening'].value == pytest.approx(0.5, abs=0.1)
-    assert found['gauge zero', 'noon'].is_notable
-
-
-# The error on parts left out is that of really refitting without them.
 
 BASE = pd.DepositionModel()
 # Heights of the passes on each panel [m], and how much more paint it got than the model says.
 PASSES_M = ((0.3, 1.1, 0.7, 1.5), (1.6, 0.6, 1.1), (0.2, 1.0, 1.8))
 LEVELS = (1.03, 0.97, 1.04)
-MISSING = BASE.with_effect(EdgeBuild(gain=1.0, length_m=0.08))
+MISSING = BASE.with_effect(EFFECTS['edge_build'](gain=1.0, length_m=0.08))
 
 
 def levelled(truth: pd.DepositionModel) -> pd.Campaign:
@@ -154,7 +138,6 @@ def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth
     found, anew = (root_mean_square(np.concatenate(each)) for each in (found_um, anew_um))
     assert step.holdout_rmse_um == pytest.approx(found)
     assert step.holdout_rmse_um == pytest.approx(anew, rel=0.02)
-    # The level of a part is not known beforehand.
     assert step.holdout_rmse_um > step.rmse_um
 
 
@@ -167,11 +150,10 @@ def test_a_level_that_no_other_part_tells_is_no_error_on_a_part_left_out():
     model = pd.refit(pd.Campaign((first, second)), None, BASE).model
     anew = pd.compare(pd.Campaign((off,)), model).points.rmse_um
     found = study.errors_left_out_um(lambda out: study.predicted_without_um(fit, out))
-    usual = study.campaign.experiment_of != 2
-    others = [
-        (study.measured_um - study.predicted_without_um(fit, out))[out]
-        for out in (study.campaign.experiment_of == 0, study.campaign.experiment_of == 1)
-    ]
+    owner = study.campaign.experiment_of
+    usual = owner != 2
+    without = study.predicted_without_um
+    others = [(study.measured_um - without(fit, owner == k))[owner == k] for k in (0, 1)]
     squares = np.sum(usual) * root_mean_square(np.concatenate(others)) ** 2
     expected = np.sqrt((squares + np.sum(~usual) * anew**2) / len(study))
     assert found == pytest.approx(expected, rel=0.03)
@@ -182,14 +164,9 @@ def test_a_level_that_no_other_part_tells_is_no_error_on_a_part_left_out():
     assert found < 0.1 * np.mean(study.measured_um)
 
 
-@pytest.fixture(scope='module')
-def study_and_fit():
-    return clean_and_fit(levelled(MISSING), BASE)
-
-
-def test_readings_left_out_have_no_part_in_what_is_predicted(study_and_fit):
+def test_readings_left_out_have_no_part_in_what_is_predicted_and_a_fitted_direction_has():
     """However wrong they are: neither by themselves nor by the level of their part."""
-    study, fit = study_and_fit
+    study, fit = clean_and_fit(levelled(MISSING), BASE)
     out = study.campaign.experiment_of == 1
     first, part, last = study.campaign.experiments
     wrong = reading(part, part.readings.thickness_um + 100.0)
@@ -197,11 +174,7 @@ def test_readings_left_out_have_no_part_in_what_is_predicted(study_and_fit):
     assert (other.measured_um[out] > study.measured_um[out] + 99.0).all()
     before, after = (one.predicted_without_um(fit, out) for one in (study, other))
     assert after == pytest.approx(before, rel=1e-4, abs=1e-3)
-
-
-def test_a_direction_that_is_fitted_too_counts_as_predicted(study_and_fit):
-    """What is learned beside the model from the other parts is predicted on the last."""
-    study, fit = study_and_fit
+    # What is learned beside the model from the other parts is predicted on the last.
     out = study.campaign.experiment_of == 2
     predict = study.forward.predict_um
     edge_um = predict(fit.model.with_effect(MISSING.effects[0])) - predict(fit.model)

@@ -1,7 +1,4 @@
-"""The model's equations beside profiles that were measured on other people's machines.
-
-Those are not shipped, as their licences are mixed; what fits say of them is in real_profiles.json.
-"""
+"""The equations beside measured profiles, which are not shipped: what fits say of them is."""
 
 import json
 import math
@@ -75,19 +72,16 @@ def test_eqs_1_and_3_follow_a_static_spot_and_a_moving_sprinkler(shared_data):
     residual = thickness - pattern.flux_um_per_s(radius_mm * 1e-3, 0.0)
     assert np.sqrt(np.mean(residual**2)) < 0.01 * thickness.max()
     assert np.abs(residual).max() < 0.03 * thickness.max()
-    # The ring and the wide centre are both needed.
     assert 0.03 < pattern.r_m < 0.07
     assert 0.3 < pattern.K2 < 0.9
 
 
 def test_thickness_falls_with_the_cosine_that_eq2_has_and_hardly_with_the_standoff(shared_data):
     """Particles of 600 m/s fly nearly parallel: neither 1 / L of a track nor 1 / L^2 of a spot."""
-    angle, standoff, thickness, *_ = table(
-        shared_data / 'hvof_wc17co_thickness_angle_standoff.csv'
-    )
-    terms = np.column_stack(
-        [np.ones(len(angle)), np.log(share_on_the_axis(angle)), np.log(standoff)]
-    )
+    measured = table(shared_data / 'hvof_wc17co_thickness_angle_standoff.csv')
+    angle, standoff, thickness, *_ = measured
+    cosine = share_on_the_axis(angle)
+    terms = np.stack([np.ones(len(angle)), np.log(cosine), np.log(standoff)], axis=1)
     best, rest, _, _ = np.linalg.lstsq(terms, np.log(thickness), rcond=None)
     variance = rest[0] / (len(terms) - terms.shape[1])
     error = np.sqrt(np.diag(variance * np.linalg.inv(terms.T @ terms)))

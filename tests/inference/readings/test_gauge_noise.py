@@ -1,6 +1,6 @@
 """Repeats: the noise they show and outliers among them; readings on the surface."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -8,19 +8,12 @@ import pytest
 import paint_deposition as pd
 from booth import panel, path_of, serpentine
 from paint_deposition.errors import ReadingsError
+from paint_deposition.inference.readings import gauge_noise as repeats
+from paint_deposition.inference.readings import readings as taken
 from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.inference.readings.gauge_noise import (
-    ASSUMED_FREEDOM,
-    gauge_noise,
-    gross_outliers,
-    left_out_lines,
-)
+from paint_deposition.inference.readings.gauge_noise import gauge_noise, gross_outliers
 from paint_deposition.inference.readings.places import columns_or_rows, unit_in_doubt
-from paint_deposition.inference.readings.readings import (
-    PointMeans,
-    Residuals,
-    require_repeats_close,
-)
+from paint_deposition.inference.readings.readings import PointMeans, Residuals
 from paint_deposition.motion.path import SprayPath
 
 # Numbers of readings at each point.
@@ -32,25 +25,21 @@ def usual_noise_um(film_um: np.ndarray) -> np.ndarray:
     return np.hypot(0.7, 0.01 * film_um)
 
 
-def campaigns(
-    layout: str, noise: Callable[[int], np.ndarray]
-) -> Iterator[tuple[pd.Readings, np.ndarray]]:
-    """Readings of 20 to 60 um and the film below them; `noise(count)` is in usual noises."""
-    repeats = LAYOUTS[layout]
-    owner = np.repeat(np.arange(len(repeats)), repeats)
-    film = np.linspace(20.0, 60.0, len(repeats))[owner]
+def campaigns(layout: str, random) -> Iterator[tuple[pd.Readings, np.ndarray]]:
+    """Readings of 20 to 60 um with the usual noise, and the film below them."""
+    counts = LAYOUTS[layout]
+    owner = np.repeat(np.arange(len(counts)), counts)
+    film = np.linspace(20.0, 60.0, len(counts))[owner]
     for _ in range(CAMPAIGNS):
-        thickness = film + usual_noise_um(film) * noise(len(owner))
+        thickness = film + usual_noise_um(film) * random.normal(size=len(owner))
         yield pd.Readings.of(np.zeros((len(owner), 3)), thickness, point=owner.astype(str)), film
 
 
 def at_points(points: str, thickness_um, sigma_um=np.nan) -> pd.Readings:
     """Readings at points of one letter each."""
-    count = len(thickness_um)
-    return pd.Readings.of(
-        np.zeros((count, 3)), thickness_um, point=np.array(list(points)),
-        sigma_um=np.broadcast_to(sigma_um, count).astype(float),
-    )  # fmt: skip
+    places, sigma_um = np.zeros((len(points), 3)), np.broadcast_to(sigma_um, len(points))
+    point = np.array(list(points))
+    return pd.Readings.of(places, thickness_um, point=point, sigma_um=sigma_um.astype(float))
 
 
 def honest_pairs(count: int = 10, sigma_um: float = 0.7) -> tuple[str, list[float]]:
@@ -65,7 +54,7 @@ def test_normal_readings_stay_and_their_noise_is_unbiased(layout):
     """100 campaigns with 20 degrees of freedom or more know a standard deviation to 1.6 %."""
     random = np.random.default_rng(3)
     squares, dropped = [], []
-    for readings, film in campaigns(layout, lambda count: random.normal(size=count)):
+    for readings, film in campaigns(layout, random):
         noise = gauge_noise(readings)
         squares.append(np.mean((noise.sigma_um / usual_noise_um(film)) ** 2))
         dropped.append(noise.gross.mean())
@@ -73,7 +62,7 @@ def test_normal_readings_stay_and_their_noise_is_unbiased(layout):
     assert np.mean(dropped) < 2e-3
 
 
-def test_one_slip_does_not_raise_the_noise():
+def test_one_slip_does_not_raise_the_noise_and_what_is_left_out_is_named():
     labels, thickness = honest_pairs()
     readings = at_points(labels + 'xxx', [*thickness, 15.5, 26.6, 26.1])
     noise = gauge_noise(readings)
@@ -81,6 +70,10 @@ def test_one_slip_does_not_raise_the_noise():
     honest = gauge_noise(readings.select(~noise.gross))
     assert noise.sigma_um[:20] == pytest.approx(honest.sigma_um[:20])
     assert noise.degrees_of_freedom == honest.degrees_of_freedom == 11
+    read = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
+    one, other = repeats.left_out_lines(read, np.array([False, True, False, False, True]))
+    assert one.startswith("point 'a': 15.5, 26.25 µm contradict each other; left out of the fit")
+    assert other.startswith("point 'b': 4 µm beside 20, 20.5; left out of the fit")
 
 
 @pytest.mark.parametrize(
@@ -99,64 +92,39 @@ def test_the_minority_at_a_point_is_wrong(thickness, gross):
     # Nine pairs in ten without any scatter are no reason to doubt the tenth.
     assert not gross_outliers(at_points(labels, [26.0] * 19 + [27.0])).any()
     # The point is on another part, which has a point of the name 'A' as well.
-    found = gross_outliers(
-        pd.Readings.joined(
-            {'rest': at_points(labels, others), 'here': at_points('A' * len(gross), thickness)}
-        )
-    )
+    here = at_points('A' * len(gross), thickness)
+    both = pd.Readings.joined({'rest': at_points(labels, others), 'here': here})
+    found = gross_outliers(both)
     assert found[20:].tolist() == gross
     assert not found[:20].any()
 
 
-@pytest.mark.parametrize(
-    ('points', 'thickness', 'gross'),
-    [('aab', [26.0, 45.0, 20.0], [True, True, False]), ('aab', [26.0, 32.0, 20.0], [False] * 3),
-     ('', [], [])],
-)  # fmt: skip
-def test_without_enough_repeats_only_what_no_gauge_reads_is_gross(points, thickness, gross):
-    assert gross_outliers(at_points(points, thickness)).tolist() == gross
+def test_without_repeats_only_what_no_gauge_reads_is_gross_and_usual_noise_is_assumed():
+    for thickness, gross in (([26.0, 45.0, 20.0], [True, True, False]),
+                             ([26.0, 32.0, 20.0], [False] * 3), ([], [])):  # fmt: skip
+        found = gross_outliers(at_points('aab'[: len(gross)], thickness))
+        assert found.tolist() == gross
+    for labels, thickness in (('ab', [20.0, 30.0]), ('a' * 9, [20.0] * 9)):
+        noise = gauge_noise(at_points(labels, thickness))
+        assert (noise.source, noise.degrees_of_freedom) == ('assumed', repeats.ASSUMED_FREEDOM)
+        assert noise.sigma_um == pytest.approx(usual_noise_um(np.array(thickness)))
 
 
-def test_what_is_left_out_is_named():
-    taken = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
-    lines = left_out_lines(taken, np.array([False, True, False, False, True]))
-    assert lines == [
-        "point 'a': 15.5, 26.25 µm contradict each other; left out of the fit, measure there "
-        'again',
-        "point 'b': 4 µm beside 20, 20.5; left out of the fit, measure it again",
-    ]
-
-
-def test_repeats_are_averaged_in_order_of_first_appearance():
+def test_repeats_are_averaged_in_order_and_one_label_at_two_places_is_refused():
     means = PointMeans.of(at_points('bacabb', [10.0, 20.0, 30.0, 22.0, 13.0, 16.0]))
     assert means.first.tolist() == [0, 1, 2]
     assert means.repeats.tolist() == [3, 2, 1]
     assert means.mean_um.tolist() == [13.0, 21.0, 30.0]
     assert means.owner.tolist() == [0, 1, 2, 1, 0, 0]
-
-
-def test_one_label_at_two_places_is_refused():
     places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.02], [0.0, 0.0, 0.05]])
     labels = np.array(['A', 'A', 'A'])
-    require_repeats_close(pd.Readings.of(places[:2], [1.0, 2.0], point=labels[:2]))
+    taken.require_repeats_close(pd.Readings.of(places[:2], [1.0, 2.0], point=labels[:2]))
     with pytest.raises(ReadingsError, match=r"point 'A' is used 0\.050 m apart"):
-        require_repeats_close(pd.Readings.of(places, [1.0, 2.0, 3.0], point=labels))
-
-
-@pytest.mark.parametrize('thickness', [[20.0, 30.0], [20.0] * 9])
-def test_without_scatter_to_go_by_the_usual_noise_is_assumed(thickness):
-    labels = 'ab' if len(thickness) == 2 else 'a' * 9
-    noise = gauge_noise(at_points(labels, thickness))
-    assert noise.source == 'assumed'
-    assert noise.degrees_of_freedom == ASSUMED_FREEDOM
-    assert noise.sigma_um == pytest.approx(np.hypot(0.7, 0.01 * np.array(thickness)))
+        taken.require_repeats_close(pd.Readings.of(places, [1.0, 2.0, 3.0], point=labels))
 
 
 def test_noise_is_pooled_within_points_beside_those_whose_noise_is_stated():
-    """At zero film the usual gauge's noise is its floor: pooling is the textbook formula.
-
-    A precise instrument for some points must not make the gauge look precise.
-    """
+    """At zero film it is the textbook formula; a precise instrument does not make the gauge so."""
     values = np.array([-1.0, 0.3, 0.7, 1.2, -1.2, 0.5, 0.1, -0.6, 0.0])
     noise = gauge_noise(at_points('aaabbbccc', values))
     squares = sum(np.var(values[k : k + 3], ddof=1) * 2 for k in (0, 3, 6))
@@ -204,25 +172,17 @@ def test_the_cause_is_named_with_both_boxes(positions_m, words):
     with pytest.raises(ReadingsError, match=words) as refused:
         placed(positions_m)
     assert 'the readings span' in str(refused.value)
-    assert 'and the part x -0.500 to 0.500, y 0.000 to 0.000, z -0.500 to 0.500 m' in str(
-        refused.value
-    )
-
-
-def test_a_small_cluster_of_readings_is_none_of_these():
-    """Three repeats beside each other on a large part are readings, not a mistake."""
+    assert 'and the part x -0.500 to 0.500, y 0.000 to 0.000, z -0.500' in str(refused.value)
+    # Three repeats beside each other on a large part are readings, not a mistake.
     assert len(placed(PLACES_M[0] + 0.001 * PLACES_M[:3])) == 3
 
 
 @pytest.mark.parametrize(
     ('factor', 'guessed', 'words'),
-    [
-        (0.1, True, 'in cm, too: say unit: {position: cm}, or mm'),
-        (1 / 25.4, True, 'in cm and in inch, too: say unit: {position: inch}, or mm'),
-        (0.1, False, ''),
-        (1.0, True, ''),
-    ],
-)
+    [(0.1, True, 'in cm, too: say unit: {position: cm}, or mm'),
+     (1 / 25.4, True, 'in cm and in inch, too: say unit: {position: inch}, or mm'),
+     (0.1, False, ''), (1.0, True, '')],
+)  # fmt: skip
 def test_a_guessed_unit_is_doubted_where_another_fits(factor, guessed, words):
     readings = pd.Readings.of(factor * PLACES_M, np.full(4, 20.0), unit_is_guessed=guessed)
     doubt = unit_in_doubt(panel(), readings)
@@ -254,7 +214,6 @@ X, Z = np.linspace(-0.4, 0.4, 9), np.linspace(-0.4, 0.4, 8)
         # Rows serve where there are no columns.
         (np.concatenate([grid(X, [0.2]), grid(X + 0.043, [-0.1])]), [('row 1', 9), ('row 2', 9)]),
         (grid([0.1], np.linspace(-0.4, 0.4, 12), 0.004), [('column 1', 12)]),
-        # A stray belongs to no line.
         (np.vstack([grid([-0.3, 0.3], Z), [[0.05, 0.0, 0.33]]]),
          [('column 1', 8), ('column 2', 8), ('', 1)]),
         *((np.random.default_rng(seed).uniform(-0.4, 0.4, (40, 3)) * [1.0, 0.0, 1.0], [('', 40)])

@@ -3,13 +3,8 @@
 import numpy as np
 
 from booth import panel
-from paint_deposition.inference.readings.places import (
-    can_stand,
-    from_edges_m,
-    grid_places,
-    on_face_m,
-    spread_places,
-)
+from paint_deposition.inference.readings import places
+from paint_deposition.inference.readings.places import can_stand, from_edges_m
 from paint_deposition.part.surface import Surface
 from surfaces import triangulated
 
@@ -23,14 +18,9 @@ def folded(slope: float) -> Surface:
     return Surface.from_triangles(*triangulated(depth, 0.01), 0.02)
 
 
-def test_a_foot_keeps_off_edges():
-    surface = panel()
-    standing = can_stand(surface, 0.03)
-    inside = np.abs(surface.vertices_m[:, [0, 2]]).max(axis=1) < 0.5 - 0.03
-    np.testing.assert_array_equal(standing, inside)
-
-
-def test_a_foot_does_not_stand_on_a_bend():
+def test_a_foot_keeps_off_edges_and_does_not_stand_on_a_bend():
+    inside = np.abs(panel().vertices_m[:, [0, 2]]).max(axis=1) < 0.5 - 0.03
+    np.testing.assert_array_equal(can_stand(panel(), 0.03), inside)
     surface = folded(1.2)
     x = surface.vertices_m[:, 0]
     standing = can_stand(surface)
@@ -39,20 +29,17 @@ def test_a_foot_does_not_stand_on_a_bend():
     assert can_stand(folded(0.1))[np.abs(x) < 0.005].any()
 
 
-def test_spread_places_are_about_as_many_as_wanted_and_apart():
+def test_spread_places_are_about_as_many_as_wanted_and_apart_and_those_of_a_grid_exactly():
     surface = panel()
     usable = surface.vertices_m[:, 0] > 0.0
-    rows = spread_places(surface, usable, 100, seed=1)
+    rows = places.spread_places(surface, usable, 100, seed=1)
     assert usable[rows].all()
     assert 80 < len(rows) < 120
     positions = surface.vertices_m[rows]
     distance = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2) + np.eye(len(rows))
     assert distance.min() > 0.05
-
-
-def test_a_grid_has_the_points_asked_for():
     surface = panel()
-    rows = grid_places(surface, can_stand(surface), 25)
+    rows = places.grid_places(surface, can_stand(surface), 25)
     assert len(set(rows)) == 25
     face = from_edges_m(surface, surface.vertices_m[rows])
     # Five rows and five columns, to the spacing of the vertices.
@@ -62,7 +49,7 @@ def test_a_grid_has_the_points_asked_for():
 
 def test_places_on_a_face_are_found_again():
     surface = folded(0.3)
-    places = np.array([[0.05, 0.1], [0.21, 0.33], [0.3, 0.02]])
-    points, hit = on_face_m(surface, places)
+    at = np.array([[0.05, 0.1], [0.21, 0.33], [0.3, 0.02]])
+    points, hit = places.on_face_m(surface, at)
     assert hit.all()
-    np.testing.assert_allclose(from_edges_m(surface, points), places, atol=1e-9)
+    np.testing.assert_allclose(from_edges_m(surface, points), at, atol=1e-9)
