@@ -175,12 +175,6 @@ def test_inspect_says_and_draws_how_the_gun_ran_over_the_door(tmp_path):
     assert (figures['mesh_file'], figures['picture']) == (str(door), None)
 
 
-def test_inspect_says_what_is_missing():
-    assert_refused(paint('inspect'), 'RECORDING', '--mesh', '--trajectory')
-    assert_refused(paint('inspect', '--mesh', SAMPLES / 'door.stl'), '--trajectory')
-    assert_refused(paint('inspect', SAMPLES / 'door_horizontal', '--out', 'a.png'), '--mesh')
-
-
 @pytest.mark.parametrize(
     ('mesh', 'bag'),
     [('door.stl', 'door_vertical'), ('measured_door/door.stl', 'measured_door/door')],

@@ -280,23 +280,3 @@ def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(door_alon
     again = paint('refit', door_alone, '--add', 'learned:incidence_deg', '--as-effect', file,
                   '-o', output)  # fmt: skip
     assert_refused(again, 'my_incidence.py is there already', 'give another name')
-
-
-@pytest.mark.parametrize(
-    ('arguments', 'words'),
-    [
-        (('diagnose', 'nowhere.yaml'), ('nowhere.yaml: no such file', 'give a campaign YAML')),
-        (('compare', CAMPAIGN, '--model', 'none.yaml'), ('none.yaml: no such file',)),
-        (('refit', CAMPAIGN, '--add', 'air_drft'), ("'air_drft'", "did you mean 'air_drift'?")),
-        (('refit', CAMPAIGN, '--add', 'mine.py'), ('mine.py',)),
-        (('refit', CAMPAIGN), ("Missing option '--add'",)),
-        (
-            ('refit', CAMPAIGN, '--add', 'edge_build', '--as-effect', 'a.py'),
-            ('learned:COVARIATE',),
-        ),
-        (('diagnose', CAMPAIGN, '--effect-file', 'mine.py'), ('mine.py',)),
-    ],
-)
-def test_bad_input_is_one_line_and_writes_nothing(arguments, words, tmp_path):
-    assert_refused(paint(*arguments, '-o', tmp_path / 'out', cwd=tmp_path), *words)
-    assert not (tmp_path / 'out').exists()

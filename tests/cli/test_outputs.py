@@ -3,7 +3,7 @@
 import pytest
 
 from booth import SAMPLES
-from cli.command import assert_refused, figures_of, paint
+from cli.command import figures_of
 from paint_deposition.files.provenance import sha256
 
 BAG = SAMPLES / 'door_horizontal'
@@ -39,6 +39,3 @@ def test_models_side_by_side_each_given_once(tmp_path, repository):
     page = (tmp_path / 'out/report.html').read_text(encoding='utf-8')
     assert f'{told["best"]} has the smallest error' in page
     assert (tmp_path / 'out/residuals_other.csv').is_file()
-    twice = ('--model', start) * 2
-    done = paint('compare', SAMPLES / 'measured_door/unseen.yaml', *twice, '-o', tmp_path / 'no')
-    assert_refused(done, 'given twice')

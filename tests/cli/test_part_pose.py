@@ -217,7 +217,3 @@ def test_bad_points_are_refused_with_their_files(tables, tmp_path):
     assert_refused(paint('locate', *tables), 'touched.csv', '2 points in common (A D)')
     (tmp_path / 'points.csv').write_text(text.replace('point,', 'weight,'))
     assert_refused(paint('locate', *tables), 'points.csv', 'give a column point')
-
-
-def test_both_lists_must_be_given(tables):
-    assert_refused(paint('locate', *tables[:2]), "Missing option '--points'")

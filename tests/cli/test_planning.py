@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import assert_refused, figures_of, film_in, paint, ran, rows_of, sheet
+from cli.command import figures_of, film_in, paint, ran, rows_of, sheet
 from folded_parts import hood
 from paint_deposition.cli.results import MARKER
 from paint_deposition.errors import ReadingsError
@@ -69,21 +69,6 @@ def test_every_option_of_a_recommendation_which_has_a_folder_by_default(model_fi
     assert f'SB50 of one pass: {1e3 * expected.sb50_m:.0f} mm' in done.stdout
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'words'),
-    [
-        ((), 'neither --speed nor --target-um'),
-        (('--speed', -1), "'--speed': -1.0 is not in the range"),
-        (('--speed', 0.2, '--tolerance', 1e-6), 'the closest is'),
-        (('--speed', 0.2, '--tolerance', 5), 'wanted: Largest sigma_n accepted, 0.05 for 5 %'),
-        (('--speed', 0.2, '--model', 'nowhere.yaml'), 'nowhere.yaml: no such file'),
-    ],
-)
-def test_impossible_recommendations_are_refused(arguments, words, tmp_path):
-    assert_refused(paint('recommend', *arguments, cwd=tmp_path), words)
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.slow
 def test_calibration_writes_model_figures_and_pictures(calibrated):
     done, folder = calibrated
@@ -126,26 +111,6 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     assert is_picture(tmp_path / 'plan' / 'film.png')
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'words'),
-    [
-        (('--mesh', 'nowhere.stl', '--speed', 0.3), 'nowhere.stl: no such mesh file'),
-        (('--mesh', SAMPLES / 'door.stl'), 'neither --speed nor --target-um'),
-        (('--mesh', SAMPLES / 'door.stl', '--speed', 0.3, '--index', -1), "'--index'"),
-        (('--mesh', 'door.stl', '--speed', 0.3, '--index', 577), '<=10.0, in metres'),
-        (('--mesh', 'door.stl', '--speed', 0.3, '--standoff', 250), '<=10.0, in metres'),
-        (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 'nan', 0), 'nan is not finite'),
-        (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 0, 0), 'give a direction'),
-        (('--mesh', 'door.stl', '--speed', 0.3, '--tip', 'tool0'), '--tip goes with a robot'),
-        (('--mesh', 'door.stl', '--speed', 0.3, '--face-angle-deg', 30), 'give --faces auto'),
-        (('--mesh', 'door.stl', '--speed', 0.3, '--time-weight', 0), 'is for --optimise'),
-    ],
-)
-def test_impossible_plans_are_refused(arguments, words, tmp_path):
-    assert_refused(paint('plan', *arguments, '-o', tmp_path / 'plan'), words)
-    assert not (tmp_path / 'plan').exists()
-
-
 @pytest.fixture
 def folded(tmp_path):
     surface = hood(0.06)
@@ -172,11 +137,6 @@ def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(folded, tmp
     assert plans[1]['sigma_n'] < 0.95 * plans[0]['sigma_n']
     assert plans[1]['film']['mean_um'] == pytest.approx(20.0, rel=0.01)
     assert not plans[1]['contacts']
-
-
-def test_an_angle_that_is_none_is_refused(folded, tmp_path):
-    options = ('--faces', 'auto', '--target-um', 20, '--face-angle-deg', 90)
-    assert_refused(paint('plan', '--mesh', folded, *options, '-o', tmp_path / 'plan'), '90')
 
 
 DOOR_MESH, BAG = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
@@ -218,21 +178,6 @@ def test_the_film_is_that_of_the_written_files(improved):
     for name, share in (('trajectory', 1e-5), ('passes.mod', within), ('passes.csv', within)):
         film = pd.simulate(surface, pd.read_recording(folder / name), model).film_um
         assert np.abs(film - expected).max() < share * expected.max(), name
-
-
-@pytest.mark.parametrize(
-    ('more', 'words'),
-    [
-        (('--speed-min', 0.5, '--speed-max', 0.2), ('--speed-min is 0.5, above --speed-max',)),
-        (('--flow', 0, 1), ('--flow', '0.0')),
-        (('--acceleration', 'fast'), ('fast',)),
-        (('--gun-signal', 'doGun'), ('--gun-signal is for RAPID modules',)),
-        (('--joint-acceleration', 2), ('--joint-acceleration goes with a robot; give --urdf',)),
-        (('--urdf', SAMPLES / 'robot.urdf'), ('--urdf needs --part-pose',)),
-    ],
-)
-def test_refusals(more, words, tmp_path):
-    assert_refused(paint('improve', *RECORDED, *more, '-o', tmp_path / 'out'), *words)
 
 
 @pytest.mark.slow
@@ -314,9 +259,3 @@ def test_without_a_trajectory_passes_are_planned(tmp_path):
     done = ran('measure', *UNPAINTED, '--target-um', 25, '--points', 16, '--json', '-o', tmp_path)
     films = [point['expected_um'] for point in json.loads(done.stdout)['points']]
     assert np.mean(films) == pytest.approx(25.0, rel=0.2)
-
-
-def test_a_part_that_nobody_paints_or_two_ways_is_refused(tmp_path):
-    assert_refused(paint('measure', *UNPAINTED, '-o', tmp_path), '--trajectory', '--target-um')
-    for more in (('--target-um', 20), ('--brush', 2)):
-        assert_refused(paint('measure', *PAINTED, *more, '-o', tmp_path), 'leave one of them out')

@@ -1,12 +1,10 @@
 """`paint inspect` and `paint recover`, as a user runs them."""
 
 import json
-from importlib.util import find_spec
 
 import pytest
 import trimesh
 
-from booth import SAMPLES
 from cli.command import assert_refused, figures_of, paint, ran
 from files.recorded import straight_pass
 from paint_deposition.files.motion_files import read_recording
@@ -54,11 +52,6 @@ def test_a_gap_longer_than_clocks_count_is_none(tmp_path):
     folder = write_pose_bag(tmp_path / 'run', straight_pass(100))
     done = ran('inspect', folder, '--max-pose-gap-s', '1e300')
     assert ' 0 gaps' in done.stdout
-
-
-@pytest.mark.parametrize('command', ['inspect', 'recover'])
-def test_nothing_there_is_one_line(command, tmp_path):
-    assert_refused(paint(command, 'nowhere', cwd=tmp_path), 'nowhere')
 
 
 def test_a_table_of_poses_says_what_was_understood(tmp_path):
@@ -142,24 +135,6 @@ def test_a_mesh_is_read_with_the_scale_and_the_body_that_are_given(panel, tmp_pa
     assert_refused(paint('inspect', tmp_path / 'part.stl', '--body', 'lid'), "no body 'lid'")
 
 
-@pytest.mark.parametrize(
-    ('file', 'given', 'what'),
-    [
-        ('door.stl', '--tf a b', 'a mesh'), ('door.stl', '--max-edge-length-m 0.1', 'a mesh'),
-        ('door.csv', '--strict', 'gauge readings'),
-        ('door.csv', '--mesh-scale 1', 'gauge readings'),
-        ('door_horizontal', '--body door', 'a bag'), ('door_horizontal', '--frame-id a', 'a bag'),
-        ('poses.csv', '--tool-axis x', 'a table of poses'),
-    ],
-)  # fmt: skip
-def test_what_does_nothing_is_refused(file, given, what, tmp_path):
-    (tmp_path / 'poses.csv').write_text('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n')
-    (tmp_path / 'door.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
-    path = tmp_path / file if file.endswith('.csv') else SAMPLES / file
-    words = given.split()
-    assert_refused(paint('inspect', path, *words), f'{words[0]}: not for {what}; leave it')
-
-
 def test_a_bag_without_poses_says_where_its_motion_is(shared_data):
     done = paint('inspect', shared_data / 'bags' / 'evo_nav2_turtlebot.mcap')
     assert 'transforms: --tf TARGET SOURCE takes the motion from them' in done.stdout
@@ -175,29 +150,3 @@ def test_inspect_a_real_program(shared_data):
     assert passed_over.startswith('note: passed over, neither motion nor paint: confl (line 11)')
     content = figures_of('inspect', module, '--json')
     assert content['moves'][0]['position_m'] == [0.61391, 2.32615, 1.04068]
-
-
-def test_the_name_of_a_file_is_no_option(panel, tmp_path):
-    path = tmp_path / 'part_pose.csv'
-    done = paint('simulate', '--mesh', panel, '--trajectory', path, '-o', tmp_path / 'out')
-    assert_refused(done, f'{path}: no such file')
-
-
-def test_a_program_has_no_topics_and_a_bag_no_gun_signal(tmp_path):
-    module = tmp_path / 'passes.mod'
-    module.write_text('')
-    given = ('--mesh', SAMPLES / 'door.stl', '-o', tmp_path / 'out', '--trajectory')
-    done = paint('simulate', *given, module, '--state-topic', '/atomizer/state')
-    assert_refused(done, '--state-topic is for bags', 'is a RAPID module; leave it out')
-    for command in (('inspect',), ('simulate', *given)):
-        done = paint(*command, SAMPLES / 'door_horizontal', '--gun-signal', 'doGun')
-        assert_refused(done, '--gun-signal is for RAPID modules')
-
-
-@pytest.mark.skipif(find_spec('rerun') is not None, reason='Rerun would open a window')
-@pytest.mark.parametrize(
-    ('run', 'words'),
-    [(SAMPLES, 'no .mcap file'), (SAMPLES / 'door_horizontal', 'pip install rerun-sdk')],
-)
-def test_a_run_that_rerun_cannot_show_says_why(run, words):
-    assert_refused(paint('view', run), words)

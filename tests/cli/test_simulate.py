@@ -11,7 +11,6 @@ import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint, ran, rows_of
 from paint_deposition.cli.results import MARKER
-from paint_deposition.effects.library.gauge_gain import GaugeGain
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
@@ -97,67 +96,6 @@ def test_predictions_are_exact_at_the_readings(panel, one_pass, tmp_path):
     expected = reference_film_um(points, spray_path(level_pass())[0], model)
     assert expected.max() > 5.0
     assert np.abs(predicted - expected).max() < 1e-4
-
-
-def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel):
-    surface = pd.read_mesh(panel, max_edge_length_m=0.1)
-    places = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.1]])
-    labels, unknown = np.array(['a', 'b']), np.full(2, np.nan)
-    readings = pd.Readings(places, np.full(2, 9.0), labels, labels, unknown)
-    gauge = pd.DepositionModel().with_effect(GaugeGain(gain=0.1))
-    plain, read = (
-        pd.simulate(surface, level_pass(), model, readings=readings)
-        for model in (pd.DepositionModel(), gauge)
-    )
-    assert np.allclose(read.predicted_um, 1.1 * plain.predicted_um)
-    assert np.array_equal(read.film_um, plain.film_um)
-
-
-def refused(tmp_path, *arguments):
-    """What `paint simulate` says; nothing may have been written."""
-    done = paint('simulate', *arguments, '-o', tmp_path / 'out')
-    assert not (tmp_path / 'out').exists()
-    return done
-
-
-@pytest.mark.parametrize(
-    ('option', 'value', 'words'),
-    [
-        ('--mesh', 'nowhere.stl', ['nowhere.stl', 'no such mesh file']),
-        ('--mesh', __file__, ['.py', '.stl']),
-        ('--mesh', '', ['--mesh is empty']),
-        ('--trajectory', '', ['--trajectory is empty']),
-        ('--trajectory', 'nowhere', ['nowhere: no such file; give a bag, a table of poses or']),
-        ('--model', 'nowhere.yaml', ['nowhere.yaml', 'no such file']),
-        ('--mesh-scale', '-1', ['--mesh-scale', '-1']),
-        ('--max-edge-length-m', '1e-6', ['max_edge_length_m', 'give an edge length of at least']),
-        ('--tolerance-um', '3', ['--target-um']),
-        ('--tolerance-um', ('60', '--target-um', '45'), ['bare metal would be within it']),
-        ('--down', ('0', '0', '0'), ['down', 'give the direction of gravity']),
-    ],
-)
-def test_bad_input_is_refused(option, value, words, panel, one_pass, tmp_path):
-    options = {'--mesh': (panel,), '--trajectory': (one_pass,)}
-    options[option] = value if isinstance(value, tuple) else (value,)
-    arguments = [part for name, values in options.items() for part in (name, *values)]
-    assert_refused(refused(tmp_path, *arguments), *words)
-
-
-def test_readings_off_the_part_are_refused_before_anything_is_written(panel, one_pass, tmp_path):
-    (tmp_path / 'readings.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,9\n0,0.5,0,9\n')
-    done = refused(
-        tmp_path, '--mesh', panel, '--trajectory', one_pass, *COARSE,
-        '--at', tmp_path / 'readings.csv',
-    )  # fmt: skip
-    assert_refused(done, 'readings.csv', "off the part's surface", '0.5')
-
-
-def test_an_output_that_is_a_file_is_refused(panel, one_pass, tmp_path):
-    (tmp_path / 'out').write_text('a file')
-    done = paint(
-        'simulate', '--mesh', panel, '--trajectory', one_pass, '-o', tmp_path / 'out'
-    )  # fmt: skip
-    assert_refused(done, '-o', 'is a file')
 
 
 def test_a_log_with_a_gap_and_a_log_pasted_twice_are_warned_of_before_the_film(tmp_path):

@@ -1,13 +1,13 @@
 """The index planner over real DDS: the service, and passes as an action."""
 
 import math
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticStatus
-from nav_msgs.msg import Path
 from paint_msgs.action import PlanPasses
 from paint_msgs.srv import RecommendIndex
 from rclpy.action import ActionClient
@@ -16,7 +16,6 @@ import paint_deposition as pd
 from nodes.cell import PANEL_M, parameters, write_panel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.nodes.index_planner import IndexPlanner
-from paint_deposition.nodes.runtime import topics
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest, PlanRequest
@@ -33,17 +32,13 @@ def planner(closed, tmp_path):
 
 @pytest.fixture
 def viewer(onlooker):
-    return onlooker({'planned_path': (Path, topics.LATCHED)})
+    return onlooker('planned_path')
 
 
 @pytest.fixture
 def ask(viewer, call):
     """`ask(**request)`: what the service answers."""
-
-    def ask(**request) -> RecommendIndex.Response:
-        return call(viewer, RecommendIndex, 'recommend_index', RecommendIndex.Request(**request))
-
-    return ask
+    return partial(call, viewer, RecommendIndex, 'recommend_index')
 
 
 def test_answer_is_the_recommendation_or_why_there_is_none(planner, ask, viewer, wait_until):
@@ -115,7 +110,7 @@ def pursue(onlooker, wait_until):
 
     A goal that is cancelled at a stage must end within two seconds.
     """
-    user = onlooker({})
+    user = onlooker()
 
     def pursue(cancel_at='', **goal):
         client = ActionClient(user, PlanPasses, 'plan_passes')
@@ -166,7 +161,7 @@ def test_the_service_answers_while_passes_are_planned_and_cancel_ends_it(
     """What has no answer is aborted with the reason."""
     mesh = write_panel(tmp_path / 'panel.stl')
     planner(max_edge_length_m=0.01, speed_m_per_s=0.25)
-    client = onlooker({}).create_client(RecommendIndex, 'recommend_index')
+    client = onlooker().create_client(RecommendIndex, 'recommend_index')
     wait_until(client.service_is_ready)
     answer = client.call_async(RecommendIndex.Request(speed_m_per_s=0.3))
     status, result, heard = pursue(cancel_at='single passes', mesh_file=str(mesh))

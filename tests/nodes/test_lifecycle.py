@@ -3,15 +3,14 @@
 import os
 import threading
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, TransformStamped
-from lifecycle_msgs.msg import TransitionEvent
+from geometry_msgs.msg import PoseStamped
+from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from paint_msgs.msg import ThicknessStats
 from paint_msgs.srv import SaveFilm
-from rclpy.qos import QoSProfile
 
 from booth import SAMPLES
 from nodes.cell import Robot, offline_um, parameters, two_passes, write_panel
@@ -19,7 +18,6 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
-from paint_deposition.nodes.runtime.topics import LATCHED
 
 MOTION = two_passes()
 EVENTS = '/deposition_simulator/transition_event'
@@ -29,24 +27,22 @@ POSES, STATE = 'deposition_simulator: poses', 'deposition_simulator: state'
 class Manager:
     """Asks one node for transitions, as a lifecycle manager does."""
 
-    def __init__(self, caller, call, name: str) -> None:
-        self._caller, self._call, self._name = caller, call, name
+    def __init__(self, call, name: str) -> None:
+        self._call, self._name = call, name
 
     def __getattr__(self, transition: str):
         """`configure()` and so on: whether it succeeded, and the state after it."""
-        request = ChangeState.Request()
-        request.transition.label = transition
 
         def change() -> tuple[bool, str]:
-            answer = self._call(self._caller, ChangeState, f'{self._name}/change_state', request)
+            wanted = Transition(label=transition)
+            answer = self._call(ChangeState, f'{self._name}/change_state', transition=wanted)
             return answer.success, self.state
 
         return change
 
     @property
     def state(self) -> str:
-        answer = self._call(self._caller, GetState, f'{self._name}/get_state', GetState.Request())
-        return answer.current_state.label
+        return self._call(GetState, f'{self._name}/get_state').current_state.label
 
 
 @pytest.fixture
@@ -57,18 +53,14 @@ def viewer(onlooker):
 @pytest.fixture
 def manager(viewer, call):
     """`manager(node)`: a manager of this node."""
-
-    def manager(node) -> Manager:
-        return Manager(viewer, call, node.get_fully_qualified_name())
-
-    return manager
+    return lambda node: Manager(partial(call, viewer), node.get_fully_qualified_name())
 
 
 def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker, call, painted,
                                              wait_until):  # fmt: skip
     node = simulator(autostart=False)
     managed = manager(node)
-    events = onlooker({EVENTS: (TransitionEvent, QoSProfile(depth=50))})
+    events = onlooker(EVENTS)
     assert managed.state == 'unconfigured'
     assert not node.count_subscribers('atomizer/pose')
     assert managed.activate() == (False, 'unconfigured')
@@ -78,9 +70,7 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
     source.send(MOTION)
     film = painted(node)
     assert managed.deactivate() == (True, 'inactive')
-    request = SaveFilm.Request(name='held')
-    saved = call(events, SaveFilm, '/deposition_simulator/save_film', request)
-    assert saved.success
+    assert call(events, SaveFilm, '/deposition_simulator/save_film', name='held').success
     assert managed.activate() == (True, 'active')
     assert np.array_equal(node.film.snapshot().film_um, film)
     assert np.array_equal(film, offline_um(node, MOTION))
@@ -114,14 +104,8 @@ def test_what_callbacks_replace_stays_until_cleanup(simulator, manager, ros_cont
         for source in robots:
             source.send(MOTION, rows, frame_id='cell')
         painted(node, len(robots) * rows.stop)
-    looks = {
-        'thickness/stats': (ThicknessStats, LATCHED),
-        'part_pose': (TransformStamped, LATCHED),
-    }
-    viewer = onlooker(looks)
-    wait_until(
-        lambda: viewer.shows('thickness/stats', lambda s: s.poses_received == len(robots) * 600)
-    )
+    viewer, sent = onlooker('thickness/stats', 'part_pose'), len(robots) * 600
+    wait_until(lambda: viewer.shows('thickness/stats', lambda s: s.poses_received == sent))
     wait_until(lambda: viewer.newest('part_pose'), what='the latched pose of the part')
     assert managed.deactivate() == (True, 'inactive')
     assert managed.cleanup() == (True, 'unconfigured')

@@ -50,18 +50,12 @@ def nodes(tmp_path):
 @pytest.fixture
 def made(nodes, closed):
     """`made(name)`: that node, running."""
-
-    def made(name: str):
-        kind, values = nodes[name]
-        return closed(kind, **values)
-
-    return made
+    return lambda name: closed(nodes[name][0], **nodes[name][1])
 
 
-@pytest.mark.parametrize(
-    'name',
-    ['simulator', 'comparison', 'web_view', 'recorder', 'joints', 'tf', 'trigger', 'player'],
-)
+@pytest.mark.parametrize('name', [
+    'simulator', 'comparison', 'web_view', 'recorder', 'joints', 'tf', 'trigger', 'player',
+])  # fmt: skip
 def test_no_message_of_the_right_type_ends_a_node(
     name, made, ros_context, spin, executor, wait_until
 ):
@@ -110,7 +104,7 @@ def test_odd_messages_spoil_no_film(made, robot, wait_until, call):
     driver.send_fields(MOTION.stamps_ns[0], spraying=False, programmed_speed_m_per_s=0.123)
     heard = node.inputs[0]
     wait_until(lambda: heard.poses_received == MESSAGES and heard.programmed_m_per_s == 0.123)
-    call(driver, Trigger, '/deposition_simulator/reset', Trigger.Request())
+    call(driver, Trigger, '/deposition_simulator/reset')
     driver.send(MOTION)
     wait_until(lambda: node.film.counts.received >= len(MOTION))
     node.catch_up()

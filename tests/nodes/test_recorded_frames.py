@@ -75,15 +75,13 @@ def test_its_replay_brings_the_transforms_along(recorded, start, executor, simul
 
 def test_the_pose_of_the_part_is_unset_by_an_empty_list_of_any_kind(simulator, onlooker, call):
     node = simulator(part_pose=PART_POSE, part_parent_frame='base_link')
-    viewer = onlooker({})
+    viewer = onlooker()
     for kind in ('BYTE', 'BOOL', 'DOUBLE'):
         assert node.set_parameters(parameters(part_pose=PART_POSE))[0].successful
         assert node.frame.on_part(PoseStamped(header=header('base_link', 0))) is not None
         value = ParameterValue(type=getattr(ParameterType, f'PARAMETER_{kind}_ARRAY'))
-        request = SetParameters.Request(
-            parameters=[ParameterMessage(name='part_pose', value=value)]
-        )
-        (result,) = call(viewer, SetParameters, SET_PARAMETERS, request).results
+        changes = [ParameterMessage(name='part_pose', value=value)]
+        (result,) = call(viewer, SetParameters, SET_PARAMETERS, parameters=changes).results
         assert result.successful, result.reason
         assert list(node.values['part_pose']) == []
         assert list(node.get_parameter('part_pose').value) == []

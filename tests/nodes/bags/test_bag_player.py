@@ -1,5 +1,7 @@
 """Replay over real DDS: the recorded bytes in the recorded order, whatever the speed."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
@@ -35,20 +37,29 @@ def test_the_recorded_bytes_arrive_in_order(play, listen, wait_until, onlooker, 
     assert (player.poses_published, player.states_published) == (700, 2)
 
 
-def test_a_ros1_bag_is_replayed_as_ros2_messages(play, listen, wait_until, tmp_path):
+@pytest.fixture
+def replayed(play, listen, wait_until):
+    """`replayed(bag, **parameters)`: who has heard all of a replay without pauses."""
+
+    def replayed(bag, **chosen):
+        listener = listen()
+        wait_until(play(bag, rate=0.0, **chosen).finished.done, what='the end of the replay')
+        return listener
+
+    return replayed
+
+
+def test_a_ros1_bag_is_replayed_as_ros2_messages(replayed, tmp_path):
     written = straight_pass(40, triggers=False)
     bag = write_bag(tmp_path / 'old.bag', pose_entries(written, ros1=True), 'ros1')
-    listener = listen()
-    player = play(bag, rate=0.0)
-    wait_until(player.finished.done, what='the end of the replay')
-    poses = [deserialize_message(cdr, PoseStamped) for cdr in listener.poses]
+    poses = [deserialize_message(cdr, PoseStamped) for cdr in replayed(bag).poses]
     assert [stamp_ns(pose.header) for pose in poses] == written.stamps_ns.tolist()
     assert [pose.pose.position.x for pose in poses] == written.positions_m[:, 0].tolist()
     assert {pose.header.frame_id for pose in poses} == {'door'}
 
 
 @pytest.mark.parametrize('kind', ['tf', 'urdf'])
-def test_a_bag_without_poses_is_replayed(kind, play, listen, wait_until, tmp_path):
+def test_a_bag_without_poses_is_replayed(kind, play, replayed, tmp_path):
     """From transforms or joint states of a robot, with the trigger, as `paint simulate` does."""
     messages, entries = Messages(), []
     stamps_ns = START_NS + 20_000_000 * np.arange(40)
@@ -65,9 +76,7 @@ def test_a_bag_without_poses_is_replayed(kind, play, listen, wait_until, tmp_pat
     with pytest.raises(RecordingError, match=remedy):
         play(bag)
     given = {'tf': ['base', 'tool0']} if kind == 'tf' else {'urdf': str(URDF)}
-    listener = listen()
-    player = play(bag, rate=0.0, state_topic='/gun', **given)
-    wait_until(player.finished.done, what='the end of the replay')
+    listener = replayed(bag, state_topic='/gun', **given)
     poses = [deserialize_message(cdr, PoseStamped) for cdr in listener.poses]
     offline = read_recording(bag, state_topic='/gun', **given)
     assert [stamp_ns(pose.header) for pose in poses] == offline.stamps_ns.tolist()
@@ -77,7 +86,7 @@ def test_a_bag_without_poses_is_replayed(kind, play, listen, wait_until, tmp_pat
     assert [stamp_ns(s.header) for s in listener.states] == offline.trigger_stamps_ns.tolist()
 
 
-def test_states_of_another_version_keep_what_they_say(play, listen, wait_until, tmp_path):
+def test_states_of_another_version_keep_what_they_say(replayed, tmp_path):
     """The bag's own definition lacks the voltage; the message of today has it."""
     (kind,) = STATE_TYPES
     messages = Messages(state_types={kind: STATE_TYPES[kind].replace('float64 voltage_kv\n', '')})
@@ -86,10 +95,7 @@ def test_states_of_another_version_keep_what_they_say(play, listen, wait_until, 
     entries = pose_entries(straight_pass(20, triggers=False))
     entries.insert(0, ('/state', START_NS - 5, state))
     bag = write_bag(tmp_path / 'older', entries, messages=messages)
-    listener = listen()
-    player = play(bag, rate=0.0, state_topic='state')
-    wait_until(player.finished.done, what='the end of the replay')
-    (taken,) = listener.states
+    (taken,) = replayed(bag, state_topic='state').states
     assert stamp_ns(taken.header) == START_NS - 9
     assert (taken.spraying, taken.flow, taken.shaping_air_l_per_min) == (True, 0.7, 250.0)
     assert np.isnan(taken.voltage_kv)
@@ -107,20 +113,17 @@ def test_a_bool_of_another_clock_is_refused(play, tmp_path):
 def test_pause_and_resume(onlooker, play, listen, call, wait_until, pass_bag):
     caller, listener = onlooker(), listen()
     player = play(pass_bag, rate=1.0, start_paused=True)
-
-    def tell(name: str) -> Trigger.Response:
-        return call(caller, Trigger, f'bag_player/{name}', Trigger.Request())
-
-    assert tell('resume').message == 'resumed'
-    assert not tell('resume').success
+    tell = partial(call, caller, Trigger)
+    assert tell('bag_player/resume').message == 'resumed'
+    assert not tell('bag_player/resume').success
     wait_until(lambda: len(listener.poses) > 20, what='poses')
-    assert tell('pause').success
-    assert tell('pause').message == 'already paused'
+    assert tell('bag_player/pause').success
+    assert tell('bag_player/pause').message == 'already paused'
     paused_at = player.poses_published
     caller.heard['/diagnostics'].clear()
     wait_until(lambda: caller.reports('bag_player: replay', 'paused'))
     assert player.poses_published - paused_at <= 1
-    assert tell('resume').success
+    assert tell('bag_player/resume').success
     wait_until(lambda: len(listener.poses) > paused_at + 20, what='more poses')
     assert listener.poses == recorded(pass_bag)[: len(listener.poses)]
 
@@ -149,18 +152,14 @@ def test_the_player_stays_within_its_window(play, listen, wait_until, pass_bag):
     """A subscriber that takes poses and never says so gets a window of them, and no more."""
     listener = listen(reports=False)  # it has the publisher, and is silent
     player = play(pass_bag, rate=0.0, window=60)
-    wait_until(lambda: player.poses_published == 60, what='a window of poses')
-    wait_until(lambda: len(listener.poses) == 60, what='the poses')
+    wait_until(lambda: len(listener.poses) == 60, what='a window of poses')
     assert player.poses_published == 60
     listener.report()
     wait_until(lambda: player.poses_published == 120, what='the next window')
     while not player.finished.done():
         taken = len(listener.poses)
         listener.report()
-        wait_until(
-            lambda taken=taken: len(listener.poses) > taken or player.finished.done(),
-            what='more poses',
-        )
+        wait_until(lambda n=taken: len(listener.poses) > n or player.finished.done())
     assert listener.poses == recorded(pass_bag)
 
 

@@ -1,6 +1,7 @@
 """The time of a replay on /clock."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -54,7 +55,7 @@ def test_the_clock_stands_before_the_start_and_while_paused(
     onlooker, play, listen, clock_ticks, call, wait_until, pass_bag, rate
 ):
     """Also for who comes late; it begins to run with the first pose."""
-    caller, ticks = onlooker({}), clock_ticks()
+    tell, ticks = partial(call, onlooker(), Trigger), clock_ticks()
     player = play(pass_bag, rate=rate, window=50)
     wait_until(lambda: len(ticks) > 5, what='the clock')
     early = clock_ticks('early')
@@ -63,11 +64,11 @@ def test_the_clock_stands_before_the_start_and_while_paused(
     assert set(ticks + early) == {straight_pass(700).stamps_ns[0]}
     listen(reports=None if rate else False)
     wait_until(lambda: player.poses_published >= 20, what='poses')
-    assert call(caller, Trigger, 'bag_player/pause', Trigger.Request()).success
+    assert tell('bag_player/pause').success
     late = clock_ticks('late')
     wait_until(lambda: len(late) > 5, what='the clock')
     assert len(set(late)) == 1
-    assert call(caller, Trigger, 'bag_player/resume', Trigger.Request()).success
+    assert tell('bag_player/resume').success
     if rate:
         wait_until(lambda: ticks[-1] > late[0] + 10**8, what='the time of the replay')
         assert ticks == sorted(ticks)

@@ -10,23 +10,18 @@ from rosbags.rosbag2 import Reader
 
 from files.recorded import START_NS
 from nodes.bags.runs import pose
-from nodes.processes import NodeProcess
+from nodes.processes import recorder_process
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.mcap_recovery import recover
 
-MODULE = 'run_recorder'
-
 
 def test_a_run_that_is_taken_away_ends_the_recorder(ros_domain, wait_until, tmp_path):
     run = tmp_path / 'run'
-    with NodeProcess(
-        tmp_path / 'recorder', MODULE, output_directory=tmp_path, name='run'
-    ) as process:
+    with recorder_process(tmp_path) as process:
         wait_until(lambda: 'recording' in process.err, what='the recording')
         shutil.rmtree(run)
-        wait_until(lambda: process.exit_code is not None, what='the end')
-        assert process.exit_code == 2
+        assert process.wait() == 2
         assert f'error: {run}/run_0.mcap: No such file or directory' in process.err
         assert 'Traceback' not in process.err
 
@@ -35,9 +30,7 @@ def test_a_killed_recorder_keeps_what_came_a_moment_before(
     ros_domain, publisher, wait_until, tmp_path
 ):
     """A hundred poses do not fill a chunk: the recorder closes it by its age."""
-    with NodeProcess(
-        tmp_path / 'recorder', MODULE, output_directory=tmp_path, name='run', topics='[/pose]'
-    ) as process:
+    with recorder_process(tmp_path, topics='[/pose]') as process:
         poses = publisher(PoseStamped, '/pose', QoSProfile(depth=100))
         for number in range(100):
             poses.publish(pose(START_NS + number * 4_000_000))

@@ -1,17 +1,16 @@
 """Several guns on one part: one film, live and replayed, whoever's poses come first."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
-from paint_msgs.msg import ThicknessField, ThicknessStats
 from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from nodes.cell import Robot, offline_um, two_passes
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.files.motion_files import MotionSource, read_gun_motions
-from paint_deposition.nodes.runtime import topics
 
 
 def moved(motion: pd.Trajectory, by_m: list[float]) -> pd.Trajectory:
@@ -48,15 +47,14 @@ def guns(ros_context, spin, wait_until):
 
 def test_each_guns_share_is_reported(simulator, guns, painted, onlooker, wait_until):
     node = simulator(atomizers=GUNS)
-    fields = {f'{gun}/thickness/field': (ThicknessField, topics.RESULTS) for gun in GUNS}
-    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)} | fields)
+    fields = [f'{gun}/thickness/field' for gun in GUNS]
+    viewer = onlooker('thickness/stats', *fields)
     first, second = guns(node)
     first.send(HIGH)
     second.send(LOW)
-    painted(node, len(HIGH) + len(LOW))
+    poses = len(HIGH) + len(LOW)
+    painted(node, poses)
     alone = [offline_um(node, motion) for motion in (HIGH, LOW)]
-
-    poses, films = len(HIGH) + len(LOW), dict(zip(fields, alone, strict=True))
     wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.poses_received == poses))
     stats = viewer.newest('thickness/stats')
     volumes = np.array([film @ node.surface.vertex_areas_m2 for film in alone])
@@ -64,18 +62,15 @@ def test_each_guns_share_is_reported(simulator, guns, painted, onlooker, wait_un
     assert np.allclose(stats.atomizer_volume_cm3, volumes, rtol=1e-12)
     assert np.allclose(stats.atomizer_share, volumes / volumes.sum(), rtol=1e-12)
     assert sum(stats.atomizer_volume_cm3) == pytest.approx(stats.painted_volume_cm3, rel=1e-12)
-    for topic, film in films.items():
-        shown = film.astype(np.float32)
-        wait_until(
-            lambda t=topic, s=shown: viewer.shows(t, lambda m: np.array_equal(m.thickness_um, s)),
-            what=topic,
-        )
-    share = f'{volumes[1] / volumes.sum():.1%}'
-    task = 'deposition_simulator: film'
-    wait_until(lambda: viewer.value(task, 'share of robot_2') == share, what=share)
-    # Of each gun's poses by themselves.
-    task = 'deposition_simulator: robot_2/poses'
-    wait_until(lambda: viewer.value(task, 'poses taken') == str(len(LOW)), what='its poses')
+    for topic, film in zip(fields, alone, strict=True):
+        same = partial(np.array_equal, film.astype(np.float32))
+        wait_until(lambda t=topic, s=same: viewer.shows(t, lambda m: s(m.thickness_um)), topic)
+    for task, key, value in (
+        ('film', 'share of robot_2', f'{volumes[1] / volumes.sum():.1%}'),
+        ('robot_2/poses', 'poses taken', str(len(LOW))),
+    ):
+        told = f'deposition_simulator: {task}', key
+        wait_until(lambda t=told, v=value: viewer.value(*t) == v, what=value)
 
 
 def test_the_first_gun_decides_which_side_is_outward(simulator, guns, painted, wait_until):
@@ -99,10 +94,7 @@ def test_what_does_not_go_together_is_refused(simulator, tmp_path):
     one_film = r'robot_1 and robot_2 differ in what acts on the finished film.*\(sag\)'
     for values, words in (
         ({'model_files': [thin]}, 'model_files names 1 models for 2 atomizers: give'),
-        (
-            {'model_files': [thin, thin], 'model_file': thin},
-            'atomizers and model_file another: give model_file',
-        ),
+        ({'model_files': [thin, thin], 'model_file': thin}, 'another: give model_file'),
         ({'model_files': [thin, sagging]}, one_film),
         ({'atomizers': ['robot_1', 'robot_1']}, r'atomizers is .*give different names'),
         ({'atomizers': ['../robot']}, r'atomizers is .*give different names'),

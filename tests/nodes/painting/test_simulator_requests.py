@@ -4,30 +4,28 @@ import json
 import math
 
 import numpy as np
+import pytest
 import trimesh
-from paint_msgs.msg import ThicknessField, ThicknessStats
 from paint_msgs.srv import SaveFilm
 from std_srvs.srv import Trigger
-from visualization_msgs.msg import MarkerArray
 
 from nodes.cell import parameters, two_passes
-from paint_deposition.nodes.runtime import topics
 
 MOTION = two_passes()
 
 
+@pytest.fixture
+def save(call):
+    """`save(caller, name)`: the answer of a simulator that is asked to save its film."""
+    service = '/deposition_simulator/save_film'
+    return lambda caller, name='': call(caller, SaveFilm, service, name=name)
+
+
 def test_its_display_changes_at_run_time_and_reset_bares_the_metal(
-    simulator, robot, painted, onlooker, call, wait_until
+    simulated, painted, onlooker, call, wait_until
 ):
-    node = simulator()
-    viewer = onlooker(
-        {
-            'thickness/field': (ThicknessField, topics.RESULTS),
-            'thickness/stats': (ThicknessStats, topics.LATCHED),
-            'thickness/legend': (MarkerArray, topics.LATCHED),
-        }
-    )
-    source = robot(node)
+    node, source = simulated()
+    viewer = onlooker('thickness/field', 'thickness/stats', 'thickness/legend')
     source.send(MOTION)
     first = painted(node)
     changes = parameters(color_max_um=25.0, target_um=10.0, target_tolerance_um=9.9)
@@ -35,7 +33,7 @@ def test_its_display_changes_at_run_time_and_reset_bares_the_metal(
     wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.within_target == 1.0))
     wait_until(lambda: viewer.shows('thickness/legend', lambda m: m.markers[-1].text == '25 µm'))
     wait_until(lambda: viewer.heard['thickness/field'])
-    answer = call(viewer, Trigger, '/deposition_simulator/reset', Trigger.Request())
+    answer = call(viewer, Trigger, '/deposition_simulator/reset')
     assert answer.success
     assert '600 poses' in answer.message
     wait_until(lambda: viewer.shows('thickness/field', lambda m: max(m.thickness_um) == 0.0))
@@ -46,13 +44,11 @@ def test_its_display_changes_at_run_time_and_reset_bares_the_metal(
     assert node.show_timer.timer_period_ns == 1_000_000_000
 
 
-def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painted, call, tmp_path):
-    node = simulator()
-    source = robot(node)
+def test_the_film_is_saved_whole_and_never_over_another(simulated, painted, save, tmp_path):
+    node, source = simulated()
     source.send(MOTION)
     film = painted(node)
-    service = '/deposition_simulator/save_film'
-    answer = call(source, SaveFilm, service, SaveFilm.Request(name='door_7'))
+    answer = save(source, 'door_7')
     assert answer.success, answer.message
     folder = tmp_path / 'films'
     written = [folder / f'door_7.{kind}' for kind in ('ply', 'csv', 'json')]
@@ -64,48 +60,40 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
     figures = json.loads((folder / 'door_7.json').read_text())
     assert figures['mesh_id'] == node.surface.mesh_id
     assert figures['poses']['received'] == len(MOTION)
-    again = call(source, SaveFilm, service, SaveFilm.Request(name='door_7'))
+    again = save(source, 'door_7')
     assert not again.success
     assert 'door_7.ply is there already' in again.message
     assert list(again.paths) == []
     for name in ('../up', 'a/b', '.hidden', 'a b', '-rf', 'x' * 300):
-        refused = call(source, SaveFilm, service, SaveFilm.Request(name=name))
+        refused = save(source, name)
         assert f"name '{name[:40]}" in refused.message
         assert ': use at most 200 letters, digits' in refused.message
     # A folder that cannot be written is told in a line.
     node.values['output_directory'] = '/dev/null/films'
-    refused = call(source, SaveFilm, service, SaveFilm.Request(name='film'))
+    refused = save(source, 'film')
     assert not refused.success
     assert '/dev/null/films' in refused.message
     assert '\n' not in refused.message
     node.values['output_directory'] = str(folder)
-    chosen = call(source, SaveFilm, service, SaveFilm.Request())
-    assert chosen.success
+    assert save(source).success
     assert len(list(folder.iterdir())) == 6
 
 
 def test_zones_are_counted_against_their_own_bands(
-    simulator, robot, painted, onlooker, call, wait_until, tmp_path
+    simulated, painted, onlooker, save, wait_until, tmp_path
 ):
-    (tmp_path / 'zones.yaml').write_text(
+    zones, viewer = tmp_path / 'zones.yaml', onlooker('thickness/stats')
+    zones.write_text(
         'zones: [{name: left, target_um: 9, tolerance_um: 3, box: [[-9, -9, -9], [0, 9, 9]]}]'
     )
-    node = simulator(
-        zones_file=str(tmp_path / 'zones.yaml'), target_um=5.0, target_tolerance_um=1.0
-    )
-    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.RESULTS)})
-    source = robot(node)
+    node, source = simulated(zones_file=str(zones), target_um=5.0, target_tolerance_um=1.0)
     source.send(MOTION)
     film, x, area = painted(node), node.surface.vertices_m[:, 0], node.surface.vertex_areas_m2
     good = np.where(x <= 0.0, np.abs(film - 9.0) <= 3.0, np.abs(film - 5.0) <= 1.0)
     share = area[good & (film > 1.0)].sum() / area[film > 1.0].sum()
-    wait_until(
-        lambda: viewer.shows('thickness/stats', lambda m: abs(m.within_target - share) < 1e-6)
-    )
-    answer = call(
-        source, SaveFilm, '/deposition_simulator/save_film', SaveFilm.Request(name='film')
-    )
-    assert answer.success, answer.message
+    counted = lambda stats: abs(stats.within_target - share) < 1e-6  # noqa: E731
+    wait_until(lambda: viewer.shows('thickness/stats', counted))
+    assert save(source, 'film').success
     figures = json.loads((tmp_path / 'films/film.json').read_text())
     (left,) = figures['zones']
     assert (left['name'], left['target_um']) == ('left', 9.0)

@@ -4,39 +4,27 @@ import math
 
 import numpy as np
 import pytest
-from paint_msgs.msg import PoseProgress, ThicknessField, ThicknessStats
-from sensor_msgs.msg import PointCloud2
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import Marker
 
 from nodes.cell import Robot, offline_um, two_passes
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.statistics import FIGURES, film_statistics
-from paint_deposition.nodes.runtime import topics
 from paint_deposition.report.colour_scales import FILM_PALETTE
 
 MOTION = two_passes()
 POSES = 'deposition_simulator: poses'
-STATS = {'thickness/stats': (ThicknessStats, topics.LATCHED)}
-PROGRESS = {'atomizer/progress': (PoseProgress, topics.PROGRESS)}
+STATS = 'thickness/stats'
 
 
-def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted, onlooker,
-                                                       wait_until):  # fmt: skip
+def test_a_late_joiner_gets_mesh_legend_and_statistics(simulated, painted, onlooker, wait_until):
     """The statistics are those of the film."""
     target = {'target_um': 10.0, 'target_tolerance_um': 5.0}
-    node = simulator(color_min_um=0.0, color_max_um=40.0, **target)
-    robot(node).send(MOTION)
+    node, source = simulated(color_min_um=0.0, color_max_um=40.0, **target)
+    source.send(MOTION)
     film = painted(node)
     node.publish()
-    late = onlooker(
-        {
-            'thickness/mesh': (Marker, topics.LATCHED),
-            'thickness/legend': (MarkerArray, topics.LATCHED),
-            'thickness/field': (ThicknessField, topics.RESULTS),
-            'thickness/cloud': (PointCloud2, topics.RESULTS),
-            **STATS,
-        }
-    )
+    kinds = 'mesh', 'legend', 'field', 'cloud', 'stats'
+    late = onlooker(*(f'thickness/{kind}' for kind in kinds))
     wait_until(lambda: all(map(late.newest, late.heard)), what='all five topics')
     mesh = late.newest('thickness/mesh')
     assert (mesh.type, mesh.header.frame_id) == (Marker.TRIANGLE_LIST, 'part')
@@ -53,9 +41,8 @@ def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted
     values = np.frombuffer(bytes(cloud.data), np.float32).reshape(-1, 4)
     assert np.array_equal(values[:, 3], film.astype(np.float32))
     texts = [m.text for m in late.newest('thickness/legend').markers if m.text]
-    assert texts[0] == '0 µm'
-    assert texts[-1] == '40 µm'
-    stats, sprayed_s = late.newest('thickness/stats'), 0.004 * (600 * (1.441 - 0.581) - 1)
+    assert (texts[0], texts[-1]) == ('0 µm', '40 µm')
+    stats, sprayed_s = late.newest(STATS), 0.004 * (600 * (1.441 - 0.581) - 1)
     for message in (mesh, field, cloud, stats):
         assert stamp_ns(message.header) == MOTION.stamps_ns[-1]
     area = node.surface.vertex_areas_m2
@@ -69,26 +56,22 @@ def test_who_takes_the_place_of_a_listener_gets_the_film(simulator, onlooker, ex
                                                          wait_until):  # fmt: skip
     """One leaves and another comes between two publications: their number stays the same."""
     simulator(publish_rate_hz=0.5)
-    field = {'thickness/field': (ThicknessField, topics.RESULTS)}
-    first = onlooker(field)
+    first = onlooker('thickness/field')
     wait_until(lambda: first.heard['thickness/field'], what='the field')
     executor.remove_node(first)
     first.destroy_node()
-    second = onlooker(field)
+    second = onlooker('thickness/field')
     wait_until(lambda: second.heard['thickness/field'], what='the field')
 
 
-def test_every_gap_in_the_stamps_is_counted_and_shown(simulator, robot, painted, onlooker,
-                                                      wait_until):  # fmt: skip
-    node = simulator()
-    viewer = onlooker(STATS)
-    source = robot(node)
+def test_every_gap_in_the_stamps_is_counted_and_shown(simulated, painted, onlooker, wait_until):
+    (node, source), viewer = simulated(), onlooker(STATS)
     # Two gaps of gun off, and one pose lost that only the rhythm tells.
     for rows in (slice(0, 100), slice(200, 300), slice(301, 400), slice(500, 600)):
         source.send(MOTION, rows)
     painted(node, 399)
-    wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.pose_gaps == 2))
-    assert viewer.newest('thickness/stats').longest_gap_s == pytest.approx(0.404)
+    wait_until(lambda: viewer.shows(STATS, lambda m: m.pose_gaps == 2))
+    assert viewer.newest(STATS).longest_gap_s == pytest.approx(0.404)
     wait_until(lambda: viewer.reports(POSES, '2 gaps'))
     for key, value in (
         ('gaps', '2'),
@@ -99,36 +82,33 @@ def test_every_gap_in_the_stamps_is_counted_and_shown(simulator, robot, painted,
         ('programmed speed [m/s]', 'unknown'),
     ):
         assert viewer.value(POSES, key) == value
-    stamp_ns = MOTION.stamps_ns[-1] + 1
-    source.send_fields(stamp_ns, spraying=True, programmed_speed_m_per_s=1.2)
+    source.send_fields(MOTION.stamps_ns[-1] + 1, spraying=True, programmed_speed_m_per_s=1.2)
     wait_until(lambda: viewer.value(POSES, 'programmed speed [m/s]') == '1.200')
 
 
-def test_poses_that_cannot_be_are_counted_and_change_nothing(simulator, robot, painted, onlooker,
+def test_poses_that_cannot_be_are_counted_and_change_nothing(simulated, painted, onlooker,
                                                              wait_until):  # fmt: skip
-    node = simulator()
-    viewer = onlooker(STATS | PROGRESS)
-    source = robot(node)
+    (node, source), viewer = simulated(), onlooker(STATS, 'atomizer/progress')
     source.send(MOTION, slice(0, 300))
-    good = MOTION.positions_m[300], MOTION.quaternions_xyzw[300]
-    source.send_pose(MOTION.stamps_ns[299] + 1, [math.nan, 0, 0], good[1])
-    source.send_pose(MOTION.stamps_ns[299] + 2, good[0], [math.inf, 0, 0, 0])
-    source.send_pose(MOTION.stamps_ns[299] + 3, good[0], [0, 0, 0, 0])
-    source.send_pose(MOTION.stamps_ns[299], *good)
-    source.send_pose(MOTION.stamps_ns[200], *good)
+    place, turn = MOTION.positions_m[300], MOTION.quaternions_xyzw[300]
+    newest = MOTION.stamps_ns[299]
+    for stamp, *pose in (
+        (newest + 1, [math.nan, 0, 0], turn), (newest + 2, place, [math.inf, 0, 0, 0]),
+        (newest + 3, place, [0, 0, 0, 0]), (newest, place, turn),
+        (MOTION.stamps_ns[200], place, turn),
+    ):  # fmt: skip
+        source.send_pose(stamp, *pose)
     source.send(MOTION, slice(300, None))
     sent = len(MOTION) + 5
     film = painted(node, sent)
     assert np.array_equal(film, offline_um(node, MOTION))
-    wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.poses_received == sent))
-    assert viewer.newest('thickness/stats').poses_rejected == 5
+    wait_until(lambda: viewer.shows(STATS, lambda m: m.poses_received == sent))
+    assert viewer.newest(STATS).poses_rejected == 5
     wait_until(lambda: viewer.reports(POSES, 'not finite'))
     for key, value in (
-        ('poses refused', '5'),
-        ('poses that are not finite', '2'),
-        ('repeated stamps', '1'),
+        ('poses refused', '5'), ('poses that are not finite', '2'), ('repeated stamps', '1'),
         ('backward stamps', '1'),
-    ):
+    ):  # fmt: skip
         assert viewer.value(POSES, key) == value
 
     # Progress names the newest pose, and no reset lowers it.
@@ -141,18 +121,16 @@ def test_poses_that_cannot_be_are_counted_and_change_nothing(simulator, robot, p
     wait_until(lambda: len(viewer.heard['atomizer/progress']) >= sent // 50)
 
 
-def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot, onlooker,
-                                                               wait_until):  # fmt: skip
-    node = simulator()
-    viewer = onlooker(STATS)
-    robot(node).send(MOTION, frame_id='base_link')
+def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulated, onlooker, wait_until):
+    (node, source), viewer = simulated(), onlooker(STATS)
+    source.send(MOTION, frame_id='base_link')
     wait_until(lambda: node.inputs[0].poses_refused == len(MOTION))
     # tf knows none either, where it is installed.
     wait_until(lambda: viewer.reports(POSES, 'no transforms connect', b'\x02'))
     assert "they are in frame 'base_link'" in viewer.status(POSES).message
     assert 'set part_pose and part_parent_frame' in viewer.status(POSES).message
     assert node.film.snapshot().film_um.max() == 0.0
-    wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.poses_rejected == len(MOTION)))
+    wait_until(lambda: viewer.shows(STATS, lambda m: m.poses_rejected == len(MOTION)))
     # Refused they were, but none is any more.
     counted = f'{len(MOTION)} poses refused for their frame'
     wait_until(lambda: viewer.reports(POSES, counted, b'\x01'), what='the error gone')
@@ -172,9 +150,8 @@ def test_two_guns_on_one_topic_are_reported(simulator, ros_context, spin, onlook
     wait_until(lambda: node.inputs[0].jumps.count > 40)
 
 
-def test_poses_that_the_queue_cannot_hold_are_counted(simulator, robot, painted):
-    node = simulator(pose_queue_depth=10)
-    source, motion = robot(node), two_passes(poses=101)
+def test_poses_that_the_queue_cannot_hold_are_counted(simulated, painted):
+    (node, source), motion = simulated(pose_queue_depth=10), two_passes(poses=101)
     source.send(motion, slice(0, 1))
     painted(node, 1)
     source.send(motion, slice(1, None))

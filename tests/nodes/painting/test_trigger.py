@@ -17,12 +17,9 @@ POSES = 'deposition_simulator: poses'
 UNTRIGGERED = two_passes(trigger=False)
 
 
-def test_a_state_of_which_only_spraying_is_filled_sprays(simulator, robot, painted, onlooker,
-                                                         wait_until):  # fmt: skip
+def test_a_state_of_which_only_spraying_is_filled_sprays(simulated, painted, onlooker, wait_until):
     """Poses that stop meanwhile are reported, until it is closed."""
-    node = simulator()
-    viewer = onlooker()
-    source = robot(node)
+    (node, source), viewer = simulated(), onlooker()
     source.send_fields(UNTRIGGERED.stamps_ns[0], spraying=True)
     source.send(UNTRIGGERED)
     film = painted(node)
@@ -63,10 +60,10 @@ def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, 
         wait_until(lambda flow=flow: node.film.guns[0].flow == flow, what='the next state')
 
 
-def test_what_leaves_the_part_bare_is_reported(simulator, robot, onlooker, wait_until):
+def test_what_leaves_the_part_bare_is_reported(simulated, onlooker, wait_until):
     """A gun by another clock, and one that sprays beside the part."""
-    node, viewer = simulator(), onlooker()
-    source, motion = robot(node), two_passes(poses=900, trigger=False)
+    (node, source), viewer = simulated(), onlooker()
+    motion = two_passes(poses=900, trigger=False)
     source.send_state(motion.stamps_ns[0] + 5_000_000_000, 1.0)
     wait_until(lambda: node.inputs[0].spraying, what='the state')
     source.send(motion, slice(0, 50))
@@ -140,9 +137,8 @@ def test_a_bool_as_the_state_is_an_error(simulator, onlooker, ros_domain, wait_u
     apart.try_shutdown()
 
 
-def test_what_a_peer_names_takes_no_memory(simulator, robot, onlooker, wait_until):
-    node, viewer = simulator(), onlooker()
-    source = robot(node)
+def test_what_a_peer_names_takes_no_memory(simulated, onlooker, wait_until):
+    (node, source), viewer = simulated(), onlooker()
     place = UNTRIGGERED.positions_m[0], UNTRIGGERED.quaternions_xyzw[0]
     for k in range(40):
         source.send_pose(UNTRIGGERED.stamps_ns[k], *place, f'{k}' + 'a' * 100_000)

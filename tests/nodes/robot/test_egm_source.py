@@ -6,9 +6,6 @@ import time
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped
-from rclpy.qos import QoSProfile
-from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
@@ -118,12 +115,7 @@ def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(start, onlo
         'address': '127.0.0.1', 'port': port, 'frame_id': 'wobj', 'external_joints': ['rail'],
         'external_scales': [0.001],
     }  # fmt: skip
-    viewer = onlooker(
-        {
-            'atomizer/pose': (PoseStamped, QoSProfile(depth=500)),
-            'joint_states': (JointState, QoSProfile(depth=500)),
-        }
-    )
+    viewer = onlooker('atomizer/pose', 'joint_states')
     start(EgmSource, **chosen)
     with pytest.raises(PaintError, match=r'cannot listen on .*or give another port'):
         start(EgmSource, **chosen)

@@ -23,7 +23,6 @@ from websockets.sync.server import serve
 from nodes.cell import parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
 from paint_deposition.nodes.robot.controllers import OpcuaSource, RwsSource
 
 GUN, FLOW = 'EtherNetIP/Gun/doGun', 'EtherNetIP/Gun/aoFlow'
@@ -157,7 +156,7 @@ class Supply:
 
 @pytest.fixture
 def states(onlooker):
-    return onlooker({'atomizer/state': (AtomizerState, LATCHED_STATES)})
+    return onlooker('atomizer/state')
 
 
 def test_signals_of_a_controller_switch_the_gun(start, states, wait_until):

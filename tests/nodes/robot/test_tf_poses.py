@@ -4,8 +4,6 @@ import importlib.util
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped
-from rclpy.qos import QoSProfile
 from scipy.spatial.transform import Rotation
 
 from nodes.cell import START_NS, Broadcaster, parameters
@@ -24,7 +22,7 @@ TCP = [0.0, 0.02, 0.15, *Rotation.from_euler('y', 25.0, degrees=True).as_quat()]
 
 @pytest.fixture
 def viewer(onlooker):
-    return onlooker({'atomizer/pose': (PoseStamped, QoSProfile(depth=500))})
+    return onlooker('atomizer/pose')
 
 
 @pytest.fixture

@@ -14,17 +14,16 @@ from paint_msgs.msg import ThicknessField
 from rclpy.serialization import deserialize_message
 
 from nodes.bags.runs import finish, messages
-from nodes.cell import two_passes, write_panel
+from nodes.cell import two_passes
 
 HERE = Path(__file__).parent
 POSES = 100
 
 
 @pytest.fixture
-def run(simulator, record, robot, painted, wait_until, tmp_path):
+def run(simulator, record, robot, painted, wait_until):
     """The messages of a run with poses and the film that they gave, and its file."""
-    mesh = write_panel(tmp_path / 'panel.stl')
-    node = simulator(mesh_file=str(mesh), max_edge_length_m=0.1, publish_rate_hz=20.0)
+    node = simulator(max_edge_length_m=0.1, publish_rate_hz=20.0)
     recorder = record()
     arm, count = robot(node, recorder), recorder.run.counts.get
     wait_until(lambda: count('/thickness/field'), what='the bare part recorded')
