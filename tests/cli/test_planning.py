@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import figures_of, film_in, paint, ran, rows_of, sheet
+from cli.command import figures_of, film_in, paint, ran, rows_of, sheet, told_in
 from folded_parts import hood
 from paint_deposition.cli.results import MARKER
 from paint_deposition.errors import ReadingsError
@@ -22,7 +22,6 @@ from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest
 
-STUDY = SAMPLES / 'panel_study'
 MODEL = pd.DepositionModel(planar=PlanarPattern(K3=0.1))
 
 
@@ -33,15 +32,9 @@ def model_file(tmp_path_factory):
     return path
 
 
-@pytest.fixture(scope='module')
-def calibrated(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('calibrated')
-    return paint('calibrate', STUDY / 'campaign.yaml', '-o', folder), folder
-
-
-def is_picture(path) -> bool:
+def is_picture(path, width: int = 600) -> bool:
     with Image.open(path) as image:
-        return image.width > 600 and len(np.unique(np.asarray(image.convert('L')))) > 20
+        return image.width > width and len(np.unique(np.asarray(image.convert('L')))) > 20
 
 
 def test_every_option_of_a_recommendation_which_has_a_folder_by_default(model_file, tmp_path):
@@ -56,7 +49,7 @@ def test_every_option_of_a_recommendation_which_has_a_folder_by_default(model_fi
     assert names == [MARKER, 'recommendation.json', 'uniformity.png']
     assert is_picture(folder / 'uniformity.png')
     content = json.loads(done.stdout)
-    assert content == json.loads((folder / 'recommendation.json').read_text())
+    assert content == told_in(folder / 'recommendation.json')
     request = IndexRequest(
         target_um=20.0, index_min_m=0.4, index_max_m=0.7, tolerance=0.2, width_m=1.2,
         length_m=2.0, one_way=True, standoff_m=0.3, travel_rad=np.pi / 2, gun_turns=True,
@@ -70,12 +63,11 @@ def test_every_option_of_a_recommendation_which_has_a_folder_by_default(model_fi
 
 
 @pytest.mark.slow
-def test_calibration_writes_model_figures_and_pictures(calibrated):
-    done, folder = calibrated
-    assert done.returncode == 0, done.stderr
-    model = pd.read_model(folder / 'model.yaml')
+def test_calibration_writes_model_figures_and_pictures(tmp_path):
+    done = ran('calibrate', SAMPLES / 'panel_study/campaign.yaml', '-o', tmp_path)
+    model = pd.read_model(tmp_path / 'model.yaml')
     assert model.planar.K1_cm3_per_s == pytest.approx(0.653, rel=0.02)
-    content = json.loads((folder / 'calibration.json').read_text())
+    content = told_in(tmp_path / 'calibration.json')
     assert content['experiments'][0]['residual_sd_um'] < 0.75
     # The panel was painted by eq. (1).
     assert content['footprint']['deviation_of_peak'] < 0.1
@@ -83,45 +75,40 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
     assert (content['converged'], content['readings']) == (True, 90)
     assert content['parameters']['r_m']['low'] < 0.231 < content['parameters']['r_m']['high']
     for name in ('collapse.png', 'profiles.png', 'agreement.png'):
-        assert is_picture(folder / name)
+        assert is_picture(tmp_path / name)
     assert 'panel_577: 70 points' in done.stdout
     assert 'warning: phi_rad is not determined' in done.stderr
 
 
 @pytest.mark.slow
 def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
-    door = SAMPLES / 'door.stl'
-    arguments = ('--mesh', door, '--model', model_file, '--target-um', 20, '--speed-max', 0.1)
-    done = ran('plan', *arguments, '-o', tmp_path / 'plan', '--json', '--paint-moves')
+    folder = tmp_path / 'plan'
+    done = ran(
+        'plan', '--mesh', SAMPLES / 'door.stl', '--model', model_file, '--target-um', 20,
+        '--speed-max', 0.1, '-o', folder, '--json', '--paint-moves',
+    )  # fmt: skip
     content = json.loads(done.stdout)
-    assert content == json.loads((tmp_path / 'plan' / 'plan.json').read_text())
+    assert content == told_in(folder / 'plan.json')
     (warning,) = content['warnings']
     assert warning.endswith('m/s are allowed (--speed-min, --speed-max)')
     assert f'warning: {warning}\n' in done.stderr
     assert content['film']['mean_um'] == pytest.approx(20.0, rel=5e-3)
     assert content['sigma_n'] < content['plane']['sigma_n_on_part']
-    names = {path.name for path in (tmp_path / 'plan').iterdir()}
-    assert names == {
+    assert {path.name for path in folder.iterdir()} == {
         MARKER, 'film.csv', 'film.ply', 'film.png', 'model.yaml', 'passes.csv', 'passes.mod',
         'plan.json', 'stats.json', 'trajectory',
     }  # fmt: skip
-    program = read_program(tmp_path / 'plan' / 'passes.mod')
+    program = read_program(folder / 'passes.mod')
     assert {'paintl', 'movel'} <= {move.instruction for move in program.moves}
-    assert len(pd.read_recording(tmp_path / 'plan' / 'trajectory')) > 1000
-    assert is_picture(tmp_path / 'plan' / 'film.png')
-
-
-@pytest.fixture
-def folded(tmp_path):
-    surface = hood(0.06)
-    path = tmp_path / 'hood.ply'
-    trimesh.Trimesh(surface.vertices_m, surface.faces, process=False).export(path)
-    return path
+    assert len(pd.read_recording(folder / 'trajectory')) > 1000
+    assert is_picture(folder / 'film.png')
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures('undrawn')
-def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(folded, tmp_path):
+def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(tmp_path):
+    surface, folded = hood(0.06), tmp_path / 'hood.ply'
+    trimesh.Trimesh(surface.vertices_m, surface.faces, process=False).export(folded)
     options = ('--faces', 'auto', '--target-um', 20, '--max-edge-length-m', 0.06, '--json')
     plans = []
     free = '--optimise', '--paint-weight', 0, '--time-weight', 0
@@ -163,8 +150,7 @@ def test_files_and_figures(improved):
     assert {'mesh', 'trajectory'} <= {file['what'] for file in figures['provenance']['files']}
     for name in ('trajectory', 'passes.csv', 'passes.mod', 'model.yaml', 'film.ply'):
         assert (folder / name).exists()
-    with Image.open(folder / 'improvement.png') as image:
-        assert image.width > 1000
+    assert is_picture(folder / 'improvement.png', 1000)
 
 
 @pytest.mark.slow
@@ -209,18 +195,16 @@ def measured(tmp_path_factory):
 @pytest.mark.slow
 def test_points_are_written_for_people_and_robots(measured):
     folder, done = measured
-    figures = json.loads((folder / 'measure.json').read_text())
+    figures = told_in(folder / 'measure.json')
     rows, poses = rows_of(folder / 'points.csv'), rows_of(folder / 'poses.csv')
-    assert [row['point'] for row in rows] == [p['point'] for p in figures['points']] + figures[
-        'read_twice'
-    ]
+    named = [point['point'] for point in figures['points']]
+    assert [row['point'] for row in rows] == named + figures['read_twice']
     assert len(poses) == len(figures['points']) == 30
     assert 'detected with a probability' in done.stdout
     for pose, point in zip(poses, figures['points'], strict=True):
         turn = Rotation.from_quat([float(pose[q]) for q in ('qx', 'qy', 'qz', 'qw')])
         np.testing.assert_allclose(turn.apply([0, 0, 1]), -np.array(point['normal']), atol=1e-6)
-    with Image.open(folder / 'points.png') as picture:
-        assert picture.width > 1000
+    assert is_picture(folder / 'points.png', 1000)
 
 
 @pytest.mark.slow

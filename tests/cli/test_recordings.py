@@ -23,8 +23,7 @@ def cut_run(tmp_path):
 
 @pytest.mark.slow
 def test_inspect_a_real_bag(shared_data):
-    done = paint('inspect', shared_data / 'bags/evo_ROS_example.bag')
-    assert done.returncode == 0
+    done = ran('inspect', shared_data / 'bags/evo_ROS_example.bag')
     assert done.stderr == ''
     line = next(line for line in done.stdout.splitlines() if line.startswith('poses on groundtr'))
     assert "12765 in frame 'groundtruth' over 889.019 s" in line
@@ -37,15 +36,14 @@ def test_recover_does_what_inspect_says_of_an_unfinished_run(cut_run, tmp_path):
     assert done.stderr.endswith(f'run: paint recover {cut_run}\n')
     figures = figures_of('recover', cut_run, '-o', tmp_path / 'whole', '--json')
     assert figures['messages'] == sum(figures['topics'].values()) > 2_000
-    done = paint('recover', cut_run)
-    assert done.returncode == 0
+    done = ran('recover', cut_run)
     assert done.stderr == ''
     first, *_, last = done.stdout.splitlines()
     assert first.endswith('the end is missing')
     assert last.endswith('messages recovered: ' + str(tmp_path / 'run_recovered'))
     assert len(read_recording(tmp_path / 'run_recovered')) > 2_000
-    again = paint('recover', cut_run)
-    assert_refused(again, 'run_recovered already exists; choose another name')
+    refusal = 'run_recovered already exists; choose another name'
+    assert_refused(paint('recover', cut_run), refusal)
 
 
 def test_a_gap_longer_than_clocks_count_is_none(tmp_path):
@@ -81,18 +79,15 @@ def test_a_table_of_readings_says_its_zeros_repeats_and_gaps(tmp_path):
     assert '(1 of them without a reading: 3)' in done.stdout
     assert '4 readings at 3 points, 1 of them measured again: noise of the gauge' in done.stdout
     assert 'film 0.0 to 23.0 µm, mean 16.2 µm\nx 0.000 to 2.000' in done.stdout
-    done = paint('inspect', 'door.csv', '--points', 'points.csv', '--json', cwd=tmp_path)
-    figures = json.loads(done.stdout)
+    figures = figures_of('inspect', 'door.csv', '--points', 'points.csv', '--json', cwd=tmp_path)
     assert (figures['zeros'], figures['repeated'], figures['readings']) == (['2'], ['1'], 4)
     assert_refused(paint('inspect', 'door.csv', cwd=tmp_path), 'have no coordinates', '--points')
-    batch = tmp_path / 'B1'
-    batch.mkdir()
-    (batch / 'header.txt').write_text('Name,B1\n')
-    (batch / 'readings.txt').write_text('Reading,Value\n1,20\n2,21\n3,22\n4,21\n')
-    films = ', '.join(f'{{"thickness": {film}}}' for film in (20, 21, 22, 21))
-    (tmp_path / 'b.json').write_text(f'[{films}]')
+    (tmp_path / 'B1').mkdir()
+    (tmp_path / 'B1/header.txt').write_text('Name,B1\n')
+    (tmp_path / 'B1/readings.txt').write_text('Reading,Value\n1,20\n2,21\n3,22\n4,21\n')
+    (tmp_path / 'b.json').write_text(json.dumps([{'thickness': um} for um in (20, 21, 22, 21)]))
     for name in ('B1', 'b.json'):
-        done = paint('inspect', name, '--points', 'points.csv', cwd=tmp_path)
+        done = ran('inspect', name, '--points', 'points.csv', cwd=tmp_path)
         assert '4 readings at 4 points' in done.stdout
 
 

@@ -9,7 +9,7 @@ import yaml
 import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
 from brushes import switched
-from cli.command import assert_refused, figures_of, level_pass, paint, ran
+from cli.command import BRUSHES, assert_refused, figures_of, level_pass, paint, ran
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.errors import ModelError
@@ -138,7 +138,7 @@ def test_a_recording_of_two_brushes_tells_its_paint(model, panel, tmp_path):
     used = told['paint']
     assert used['wet_cm3'] == pytest.approx((200 + 400) / 60, rel=1e-6)
     assert used['transfer_efficiency'] == pytest.approx(told['painted_volume_cm3'] / 4.0)
-    assert used['mean_wet_film_um'] == pytest.approx(told['mean_um'] / 0.4)
+    assert used['mean_wet_film_um'] == pytest.approx(told['mean_um'] / 0.4, rel=1e-9)
     assert used['spraying_time_s_by_brush'] == pytest.approx({'1': 1.0, '2': 1.0})
     assert told['provenance']['models']['model']['brushes'][1]['number'] == 2
 

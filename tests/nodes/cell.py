@@ -1,5 +1,6 @@
 """A small paint cell for tests: a panel, a motion over it, the robot and those who look on."""
 
+import socket
 import time
 from pathlib import Path
 
@@ -124,6 +125,13 @@ def offline_um(
     return integrator.film_um
 
 
+def free_port(kind: int = socket.SOCK_DGRAM) -> int:
+    """A port of this machine that nobody listens on."""
+    with socket.socket(socket.AF_INET, kind) as free:
+        free.bind(('127.0.0.1', 0))
+        return free.getsockname()[1]
+
+
 def saved_um(table: Path | str) -> np.ndarray:
     """The film in a table that the simulator wrote."""
     return np.loadtxt(table, delimiter=',', skiprows=1)[:, 3]
@@ -137,13 +145,15 @@ def parameters(**values: object) -> list[Parameter]:
 class Robot(Node):
     """Publishes poses and states as a cell would."""
 
-    def __init__(self, context, reliable: bool = True, **options) -> None:
+    def __init__(self, context, reliable: bool = True, latched: bool = False, **options) -> None:
         super().__init__('robot', context=context, **options)
         profile = QoSProfile(depth=2000)
         if not reliable:
             profile.reliability = ReliabilityPolicy.BEST_EFFORT
         self.pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
-        self.state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
+        kept = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        states = kept if latched else profile
+        self.state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', states)
 
     def is_subscribed_by(self, *nodes: Node) -> bool:
         """Both sides know of each other: what is sent from now on arrives."""

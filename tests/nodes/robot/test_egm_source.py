@@ -7,6 +7,7 @@ import time
 import numpy as np
 import pytest
 
+from nodes.cell import free_port
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.nodes.robot.egm_source import EgmSource, EgmStream
@@ -108,14 +109,11 @@ def test_a_step_of_the_controllers_clock_does_not_move_the_stamps(step_ms):
 
 
 def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(start, onlooker, wait_until):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(('127.0.0.1', 0))
-        port = free.getsockname()[1]
+    port, viewer = free_port(), onlooker('atomizer/pose', 'joint_states')
     chosen = {
         'address': '127.0.0.1', 'port': port, 'frame_id': 'wobj', 'external_joints': ['rail'],
         'external_scales': [0.001],
     }  # fmt: skip
-    viewer = onlooker('atomizer/pose', 'joint_states')
     start(EgmSource, **chosen)
     with pytest.raises(PaintError, match=r'cannot listen on .*or give another port'):
         start(EgmSource, **chosen)

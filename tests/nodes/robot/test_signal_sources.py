@@ -20,7 +20,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from paint_msgs.msg import AtomizerState
 from websockets.sync.server import serve
 
-from nodes.cell import parameters
+from nodes.cell import free_port, parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.nodes.robot.controllers import OpcuaSource, RwsSource
@@ -204,7 +204,7 @@ class _OneUser:
 
 
 def test_a_supply_may_ask_for_a_user_and_encryption(
-    start, states, wait_until, free_port, tmp_path, monkeypatch
+    start, states, wait_until, tmp_path, monkeypatch
 ):
     """The password is in no parameter and in no diagnostics."""
     files = {
@@ -219,7 +219,7 @@ def test_a_supply_may_ask_for_a_user_and_encryption(
     )
     files['certificate'].write_bytes(made.public_bytes(Encoding.DER))
     monkeypatch.setenv('OPCUA_PASSWORD', 'secret')
-    address = f'opc.tcp://127.0.0.1:{free_port}'
+    address = f'opc.tcp://127.0.0.1:{free_port(socket.SOCK_STREAM)}'
     with Supply(address, files).running():
         node = start(
             OpcuaSource, url=address, trigger='ns=2;s=Gun.Open', user='cell',
@@ -230,10 +230,8 @@ def test_a_supply_may_ask_for_a_user_and_encryption(
         assert 'secret' not in str(node.values)
 
 
-def test_variables_of_a_material_supply_count_from_their_own_time(
-    start, states, wait_until, free_port
-):
-    address = f'opc.tcp://127.0.0.1:{free_port}'
+def test_variables_of_a_material_supply_count_from_their_own_time(start, states, wait_until):
+    address = f'opc.tcp://127.0.0.1:{free_port(socket.SOCK_STREAM)}'
     with Supply(address).running() as supply:
         values = {'trigger': 'ns=2;s=Gun.Open', 'voltage': '2:Gun/2:Voltage'}
         start(OpcuaSource, url=address, **values)
@@ -260,13 +258,6 @@ def test_variables_of_a_material_supply_count_from_their_own_time(
         wait_until(lambda: len(states.heard['atomizer/state']) > heard, what='the closing')
         assert states.newest('atomizer/state').voltage_kv == 62.0
         wait_until(lambda: states.reports('opcua_source: signals', told, b'\x02'), what=told)
-
-
-@pytest.fixture
-def free_port():
-    with socket.socket() as free:
-        free.bind(('127.0.0.1', 0))
-        return free.getsockname()[1]
 
 
 def test_values_from_before_a_connection_are_not_called_late(ros_context):
