@@ -20,38 +20,39 @@ from paint_deposition.cli.results import Progress
 from waiting import until
 
 
+def python(program: str, **environment: str) -> list[str]:
+    """The lines that a new process of Python prints."""
+    done = subprocess.run(
+        [sys.executable, '-c', program], env=os.environ | environment, capture_output=True,
+        text=True, check=True,
+    )  # fmt: skip
+    return done.stdout.splitlines()
+
+
 @pytest.mark.parametrize('arguments', [[], ['-h']])
 def test_help_lists_every_command_in_a_line(arguments):
     done = paint(*arguments)
-    assert done.returncode == 0
-    assert done.stderr == ''
+    assert (done.returncode, done.stderr) == (0, '')
     listed = done.stdout.split('Commands:\n')[1].splitlines()
     assert [line.split()[0] for line in listed] == list(COMMANDS)
 
 
 def test_help_comes_at_once():
     """What takes seconds to load is not loaded for it."""
-    program = (
-        'import sys\n'
-        'from paint_deposition.cli.main import COMMANDS, run\n'
-        'codes = [run(["--help"]), run(["--version"]), run(["simulate", "--help"])]\n'
-        'slow = {"numpy", "numba", "scipy", "matplotlib", "rosbags", "rclpy"}\n'
-        'print("loaded", sorted(slow & set(sys.modules)), codes)\n'
-    )
-    done = subprocess.run(
-        [sys.executable, '-c', program], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == 'loaded [] [0, 0, 0]'
+    program = """
+import sys
+from paint_deposition.cli.main import run
+codes = [run(['--help']), run(['--version']), run(['simulate', '--help'])]
+slow = {'numpy', 'numba', 'scipy', 'matplotlib', 'rosbags', 'rclpy'}
+print('loaded', sorted(slow & set(sys.modules)), codes)
+"""
+    assert python(program)[-1] == 'loaded [] [0, 0, 0]'
 
 
-@pytest.mark.parametrize(
-    ('typed', 'offered'),
-    [
-        ('re', ['recommend', 'refit', 'recover']),
-        ('--v', ['--version']),
-        ('plan --fac', ['--faces', '--face-angle-deg']),
-    ],
-)
+@pytest.mark.parametrize(('typed', 'offered'), [
+    ('re', ['recommend', 'refit', 'recover']), ('--v', ['--version']),
+    ('plan --fac', ['--faces', '--face-angle-deg']),
+])  # fmt: skip
 def test_the_shell_completes_commands_and_options(typed, offered):
     line = 'eval "$(_PAINT_COMPLETE=bash_source paint)"'
     words = f'COMP_WORDS=(paint {typed}); COMP_CWORD={len(typed.split())}'
@@ -61,20 +62,15 @@ def test_the_shell_completes_commands_and_options(typed, offered):
 
 
 def test_completing_a_command_loads_none():
-    program = (
-        'import atexit, sys\n'
-        'from paint_deposition.cli.main import run\n'
-        'rooms = lambda: sorted(n for n in sys.modules if n.startswith("paint_deposition.cli."))\n'
-        'atexit.register(lambda: print(rooms()))\n'
-        'run([])\n'
-    )
-    environment = os.environ | {
-        '_PAINT_COMPLETE': 'bash_complete', 'COMP_WORDS': 'paint ', 'COMP_CWORD': '1',
-    }  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, '-c', program], env=environment, capture_output=True, text=True
-    )
-    *offered, loaded = done.stdout.splitlines()
+    program = """
+import atexit, sys
+from paint_deposition.cli.main import run
+rooms = lambda: sorted(n for n in sys.modules if n.startswith('paint_deposition.cli.'))
+atexit.register(lambda: print(rooms()))
+run([])
+"""
+    typed = {'_PAINT_COMPLETE': 'bash_complete', 'COMP_WORDS': 'paint ', 'COMP_CWORD': '1'}
+    *offered, loaded = python(program, **typed)
     assert offered == [f'plain,{name}' for name in COMMANDS]
     assert ast.literal_eval(loaded) == ['paint_deposition.cli.main']
 

@@ -1,5 +1,6 @@
 """Options of a command from the model of its request."""
 
+import inspect
 import math
 from typing import Literal
 
@@ -54,11 +55,9 @@ def test_a_verb_shows_the_fields_of_its_request():
     def spray(model, *, frame_id='part', **wanted):
         return Coat(**wanted)
 
-    import inspect
-
-    shown = inspect.signature(spray)
-    assert list(shown.parameters)[:3] == ['model', 'frame_id', 'speed_m_per_s']
-    assert shown.parameters['speed_m_per_s'].default == 0.3
+    shown = inspect.signature(spray).parameters
+    assert list(shown)[:3] == ['model', 'frame_id', 'speed_m_per_s']
+    assert shown['speed_m_per_s'].default == 0.3
 
 
 @pytest.mark.parametrize('kind', [MotionOptions, OnePart, FilmBand])

@@ -5,9 +5,11 @@ import json
 import pytest
 import trimesh
 
+from booth import SAMPLES
 from cli.command import assert_refused, figures_of, paint, ran
 from files.recorded import straight_pass
 from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.provenance import sha256
 from paint_deposition.files.recordings.bags import write_pose_bag
 
 
@@ -35,6 +37,9 @@ def test_recover_does_what_inspect_says_of_an_unfinished_run(cut_run, tmp_path):
     assert_refused(done)
     assert done.stderr.endswith(f'run: paint recover {cut_run}\n')
     figures = figures_of('recover', cut_run, '-o', tmp_path / 'whole', '--json')
+    # A gap that is longer than clocks count is none.
+    told = ran('inspect', tmp_path / 'whole', '--max-pose-gap-s', '1e300').stdout
+    assert ' 0 gaps' in told
     assert figures['messages'] == sum(figures['topics'].values()) > 2_000
     done = ran('recover', cut_run)
     assert done.stderr == ''
@@ -44,12 +49,6 @@ def test_recover_does_what_inspect_says_of_an_unfinished_run(cut_run, tmp_path):
     assert len(read_recording(tmp_path / 'run_recovered')) > 2_000
     refusal = 'run_recovered already exists; choose another name'
     assert_refused(paint('recover', cut_run), refusal)
-
-
-def test_a_gap_longer_than_clocks_count_is_none(tmp_path):
-    folder = write_pose_bag(tmp_path / 'run', straight_pass(100))
-    done = ran('inspect', folder, '--max-pose-gap-s', '1e300')
-    assert ' 0 gaps' in done.stdout
 
 
 def test_a_table_of_poses_says_what_was_understood(tmp_path):
@@ -64,9 +63,6 @@ def test_a_table_of_poses_says_what_was_understood(tmp_path):
     assert stream.startswith('50.0 a second, 0 gaps, longest interval 0.020 s, 0 repeated and 0')
     told = figures_of('inspect', tmp_path / 'poses.csv', '--json')
     assert told['high_m'] == [0.095, 0.0, 0.0]
-
-
-def test_a_table_with_quaternions_is_one_of_poses(tmp_path):
     (tmp_path / 'poses.csv').write_text('t,x,y,z,qx,qy,qz,qw,value\n0,0,0,0,0,0,0,1,20\n')
     assert figures_of('inspect', tmp_path / 'poses.csv', '--json')['poses'] == 1
 
@@ -108,26 +104,23 @@ def test_a_table_with_every_sample_twice_says_the_rate_without_them(tmp_path):
     assert 'they are dropped, and 125 a second are left' in done.stderr
 
 
-@pytest.mark.parametrize(
-    ('scale', 'words'),
-    [(1.0, 'taken for metres'), (1e3, 'looks like millimetres, else it would be 1200 m large')],
-)
-def test_a_mesh_says_its_size_and_unit(panel, scale, words, tmp_path):
-    mesh = trimesh.load_mesh(panel)
-    mesh.apply_scale(scale).export(tmp_path / 'part.stl')
-    first, unit, box = paint('inspect', tmp_path / 'part.stl').stdout.splitlines()
-    assert first == 'part.stl: a mesh of 2 triangles, 1.200 x 0.000 x 0.800 m, 0.96 m2'
-    assert words in unit
-    assert box == 'x -0.600 to 0.600, y 0.000 to 0.000, z -0.400 to 0.400 m'
-
-
-def test_a_mesh_is_read_with_the_scale_and_the_body_that_are_given(panel, tmp_path):
-    trimesh.load_mesh(panel).apply_scale(1e3).export(tmp_path / 'part.stl')
+def test_a_mesh_says_its_size_and_unit(panel, tmp_path):
+    """It is read with the scale and the body that are given."""
+    part, mesh = tmp_path / 'part.stl', trimesh.load_mesh(panel)
+    for scale, words in (
+        (1.0, 'taken for metres'),
+        (1e3, 'looks like millimetres, else it would be 1200 m large'),
+    ):
+        mesh.apply_scale(scale).export(part)
+        first, unit, box = ran('inspect', part).stdout.splitlines()
+        assert first == 'part.stl: a mesh of 2 triangles, 1.200 x 0.000 x 0.800 m, 0.96 m2'
+        assert words in unit
+        assert box == 'x -0.600 to 0.600, y 0.000 to 0.000, z -0.400 to 0.400 m'
     given = ('--mesh-scale', 0.001, '--body', 'part')
-    figures = figures_of('inspect', tmp_path / 'part.stl', *given, '--json')
+    figures = figures_of('inspect', part, *given, '--json')
     assert (figures['mesh_scale'], figures['high_m'][0]) == (0.001, pytest.approx(0.6))
-    assert 'read with --mesh-scale 0.001' in ran('inspect', tmp_path / 'part.stl', *given).stdout
-    assert_refused(paint('inspect', tmp_path / 'part.stl', '--body', 'lid'), "no body 'lid'")
+    assert 'read with --mesh-scale 0.001' in ran('inspect', part, *given).stdout
+    assert_refused(paint('inspect', part, '--body', 'lid'), "no body 'lid'")
 
 
 def test_a_bag_without_poses_says_where_its_motion_is(shared_data):
@@ -145,3 +138,18 @@ def test_inspect_a_real_program(shared_data):
     assert passed_over.startswith('note: passed over, neither motion nor paint: confl (line 11)')
     content = figures_of('inspect', module, '--json')
     assert content['moves'][0]['position_m'] == [0.61391, 2.32615, 1.04068]
+
+
+def test_provenance_names_each_file_with_its_digest():
+    bag = SAMPLES / 'door_horizontal'
+    (file,) = figures_of('inspect', bag, '--json')['provenance']['files']
+    assert file == {'what': 'recording', 'file': str(bag), 'sha256': sha256(bag)}
+
+
+def test_a_digest_changes_with_content_and_with_names(tmp_path):
+    (tmp_path / 'a').write_text('film')
+    first = sha256(tmp_path)
+    (tmp_path / 'a').rename(tmp_path / 'b')
+    renamed = sha256(tmp_path)
+    (tmp_path / 'b').write_text('films')
+    assert len({first, renamed, sha256(tmp_path)}) == 3

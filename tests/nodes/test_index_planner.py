@@ -14,13 +14,13 @@ from rclpy.action import ActionClient
 
 import paint_deposition as pd
 from nodes.cell import PANEL_M, parameters, write_panel
+from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest, PlanRequest
 
-COARSE = {'max_edge_length_m': 0.05, 'speed_m_per_s': 0.25}
 NARROW = pd.DepositionModel(planar=PlanarPattern(K3=0.0, r_m=0.11, sigma1_m=0.045, sigma2_m=0.075))
 
 
@@ -43,19 +43,16 @@ def ask(viewer, call):
 
 def test_answer_is_the_recommendation_or_why_there_is_none(planner, ask, viewer, wait_until):
     node = planner()
-    answer = ask(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
-    expected = recommend(
-        pd.DepositionModel(), IndexRequest(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
-    )
+    wanted = {'speed_m_per_s': 0.2, 'tolerance': 0.1, 'width_m': 1.5}
+    answer = ask(**wanted)
+    expected = recommend(pd.DepositionModel(), IndexRequest(**wanted))
     assert answer.success
-    assert answer.index_m == expected.index_m
-    assert answer.sigma_n == expected.sigma_n
+    for name in ('index_m', 'sigma_n', 'passes', 'cycle_time_s', 'mean_um'):
+        assert getattr(answer, name) == getattr(expected, name)
     assert list(answer.index_range_m) == [0.2, 0.8]
     assert list(answer.window_high_m) == [high for _, high in expected.windows_m]
     assert list(answer.minima_index_m) == [m.index_m for m in expected.minima]
-    assert (answer.passes, answer.travel) == (expected.passes, 'alternating')
-    assert answer.cycle_time_s == expected.cycle_time_s
-    assert answer.mean_um == expected.mean_um
+    assert answer.travel == 'alternating'
     np.testing.assert_array_equal(answer.curve_sigma_n, expected.curve.sigma_n)
     assert answer.standoff_drift_low_m == expected.standoff_drift_m[0]
     assert 'keeps its orientation' in answer.message
@@ -90,20 +87,6 @@ def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path)
     assert ask(speed_m_per_s=0.2, tolerance=0.1).index_m == pytest.approx(0.5 * wide, rel=0.03)
 
 
-def test_passes_are_planned_on_a_mesh_and_latched(planner, viewer, wait_until, tmp_path):
-    mesh = write_panel(tmp_path / 'panel.stl')
-    planner(mesh_file=str(mesh), frame_id='panel', speed_m_per_s=0.0, target_um=15.0)
-    wait_until(lambda: viewer.newest('planned_path'), what='the latched path')
-    path = viewer.newest('planned_path')
-    assert path.header.frame_id == 'panel'
-    at = np.array([[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in path.poses])
-    # The panel stands in x-z and looks to -y; passes run along x, past both its edges.
-    np.testing.assert_allclose(at[:, 1], -0.25, atol=1e-6)
-    assert np.ptp(at[:, 0]) > PANEL_M + 0.4
-    stamps = [p.header.stamp.sec * 10**9 + p.header.stamp.nanosec for p in path.poses]
-    assert all(later > earlier for earlier, later in pairwise(stamps))
-
-
 @pytest.fixture
 def pursue(onlooker, wait_until):
     """`pursue(cancel_at='', **goal)`: the status, the result and the feedback.
@@ -133,9 +116,21 @@ def pursue(onlooker, wait_until):
     return pursue
 
 
-def test_passes_are_planned_with_feedback(planner, pursue, viewer, wait_until, tmp_path):
+def test_passes_are_planned_and_latched(planner, pursue, viewer, wait_until, tmp_path):
+    """On the mesh of the node at its start, and for a goal with feedback."""
     mesh = write_panel(tmp_path / 'panel.stl')
-    planner(**COARSE)
+    chosen = {'mesh_file': str(mesh), 'frame_id': 'panel', 'max_edge_length_m': 0.05}
+    planner(**chosen, speed_m_per_s=0.0, target_um=15.0)
+    wait_until(lambda: viewer.newest('planned_path'), what='the latched path')
+    path = viewer.newest('planned_path')
+    assert path.header.frame_id == 'panel'
+    at = np.array([[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in path.poses])
+    # The panel stands in x-z and looks to -y; passes run along x, past both its edges.
+    np.testing.assert_allclose(at[:, 1], -0.25, atol=1e-6)
+    assert np.ptp(at[:, 0]) > PANEL_M + 0.4
+    stamps = [stamp_ns(pose.header) for pose in path.poses]
+    assert all(later > earlier for earlier, later in pairwise(stamps))
+
     status, result, heard = pursue(mesh_file=str(mesh), target_um=15.0, direction='vertical')
     assert status == GoalStatus.STATUS_SUCCEEDED, result.message
     expected = plan(
@@ -149,15 +144,11 @@ def test_passes_are_planned_with_feedback(planner, pursue, viewer, wait_until, t
     stages = [feedback.stage for feedback in heard]
     assert stages[:2] == ['begin', 'reading the mesh']
     assert {'single passes', 'film'} <= set(stages)
-    wait_until(lambda: viewer.newest('planned_path'), what='the path')
-    path = viewer.newest('planned_path')
-    assert path == result.path
-    assert len(path.poses) > 10
+    wait_until(lambda: viewer.newest('planned_path') == result.path, what='the path')
+    assert len(result.path.poses) > 10
 
 
-def test_the_service_answers_while_passes_are_planned_and_cancel_ends_it(
-    planner, pursue, onlooker, wait_until, tmp_path
-):
+def test_answers_go_on_and_cancel_ends_a_plan(planner, pursue, onlooker, wait_until, tmp_path):
     """What has no answer is aborted with the reason."""
     mesh = write_panel(tmp_path / 'panel.stl')
     planner(max_edge_length_m=0.01, speed_m_per_s=0.25)

@@ -55,14 +55,11 @@ def assert_passes(files: list[str], entered: dict[str, None]) -> None:
     assert [file for file in entered if file in files] == files
 
 
-@pytest.mark.parametrize(
-    ('name', 'words'),
-    [
-        ('`paint simulate`', ('simulate', *DOOR)),
-        ('`paint improve`', ('improve', *DOOR)),
-        ('`paint diagnose`', ('diagnose', CAMPAIGN)),
-    ],
-)
+@pytest.mark.parametrize(('name', 'words'), [
+    ('`paint simulate`', ('simulate', *DOOR)),
+    ('`paint improve`', ('improve', *DOOR)),
+    ('`paint diagnose`', ('diagnose', CAMPAIGN)),
+])  # fmt: skip
 def test_a_command_passes_the_files_of_its_journey(name, words, entered, repository, tmp_path):
     ran(*words, '-o', tmp_path / 'results')
     assert_passes(journey(repository, name), entered)

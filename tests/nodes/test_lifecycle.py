@@ -58,6 +58,7 @@ def manager(viewer, call):
 
 def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker, call, painted,
                                              wait_until):  # fmt: skip
+    """Poses that it receives while it is inactive are counted and not painted."""
     node = simulator(autostart=False)
     managed = manager(node)
     events = onlooker(EVENTS)
@@ -65,23 +66,32 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
     assert not node.count_subscribers('atomizer/pose')
     assert managed.activate() == (False, 'unconfigured')
     assert managed.configure() == (True, 'inactive')
-    assert managed.activate() == (True, 'active')
     source = robot(node)
-    source.send(MOTION)
-    film = painted(node)
+    source.send(MOTION, slice(0, 300))
+    told = '300 poses came and were not painted'
+    wait_until(lambda: events.reports(POSES, told, b'\x01'))
+    assert managed.activate() == (True, 'active')
+    source.send(MOTION, slice(300, 600))
+    film = painted(node, 300)
+    wait_until(lambda: events.reports(POSES, 'painting', b'\x00'))
+    assert events.value(POSES, 'poses not painted while inactive') == '300'
     assert managed.deactivate() == (True, 'inactive')
     assert call(events, SaveFilm, '/deposition_simulator/save_film', name='held').success
     assert managed.activate() == (True, 'active')
     assert np.array_equal(node.film.snapshot().film_um, film)
-    assert np.array_equal(film, offline_um(node, MOTION))
+    # The states count that came before.
+    second_pass = replace(
+        MOTION, stamps_ns=MOTION.stamps_ns[300:], positions_m=MOTION.positions_m[300:],
+        quaternions_xyzw=MOTION.quaternions_xyzw[300:],
+    )  # fmt: skip
+    assert np.array_equal(film, offline_um(node, second_pass))
     assert managed.deactivate() == (True, 'inactive')
     assert managed.cleanup() == (True, 'unconfigured')
     wait_until(lambda: not source.pose_publisher.get_subscription_count())
     assert managed.configure() == (True, 'inactive')
     assert node.film.counts.received == 0
     assert managed.shutdown() == (True, 'finalized')
-    rows = range(len(events.heard[EVENTS]))
-    states = [events.decoded(EVENTS, row).goal_state.label for row in rows]
+    states = [event.goal_state.label for event in events.all(EVENTS)]
     assert states[-2:] == ['shuttingdown', 'finalized']
 
 
@@ -112,33 +122,7 @@ def test_what_callbacks_replace_stays_until_cleanup(simulator, manager, ros_cont
     wait_until(lambda: not any(source.has_subscribers(1) for source in robots))
 
 
-def test_poses_received_while_inactive_are_counted_and_not_painted(
-    simulator, robot, manager, painted, viewer, wait_until
-):
-    node = simulator(autostart=False)
-    managed = manager(node)
-    managed.configure()
-    source = robot(node)
-    source.send(MOTION, slice(0, 300))
-
-    told = '300 poses came and were not painted'
-    wait_until(lambda: viewer.reports(POSES, told, b'\x01'))
-    managed.activate()
-    source.send(MOTION, slice(300, 600))
-    film = painted(node, 300)
-    # The states count that came before.
-    second_pass = replace(
-        MOTION, stamps_ns=MOTION.stamps_ns[300:], positions_m=MOTION.positions_m[300:],
-        quaternions_xyzw=MOTION.quaternions_xyzw[300:],
-    )  # fmt: skip
-    assert np.array_equal(film, offline_um(node, second_pass))
-    wait_until(lambda: viewer.reports(POSES, 'painting', b'\x00'))
-    assert viewer.value(POSES, 'poses not painted while inactive') == '300'
-
-
-def test_what_it_reads_can_be_changed_while_it_is_not_configured(
-    simulator, manager, viewer, wait_until, tmp_path
-):
+def test_what_it_reads_may_change_unconfigured(simulator, manager, viewer, wait_until, tmp_path):
     """A part that cannot be read leaves it unconfigured, and it says so."""
     (tmp_path / 'late.stl').write_text('no mesh')
     other = str(write_panel(tmp_path / 'other.stl'))
@@ -176,9 +160,7 @@ class Faulty(ManagedNode):
         raise ZeroDivisionError('by nothing')
 
 
-def test_an_unexpected_error_leads_to_unconfigured(
-    start, ros_context, manager, viewer, wait_until
-):
+def test_an_unforeseen_error_ends_unconfigured(start, ros_context, manager, viewer, wait_until):
     node = start(Faulty, autostart=False)
     managed = manager(node)
     publishers = len(list(node.publishers))
@@ -195,9 +177,7 @@ def test_an_unexpected_error_leads_to_unconfigured(
         Faulty(context=ros_context)
 
 
-def test_a_recorder_writes_one_whole_run_for_each_activation(
-    record, ros_context, spin, manager, wait_until, tmp_path
-):
+def test_each_activation_is_a_whole_run(record, ros_context, spin, manager, wait_until, tmp_path):
     recorder = record(autostart=False)
     managed = manager(recorder)
     source = Robot(ros_context)

@@ -35,9 +35,7 @@ def call(onlooker, call):
     return partial(call, onlooker())
 
 
-def test_a_replay_waits_for_who_is_still_loading_and_gives_the_offline_film(
-    ros_domain, call, onlooker, wait_until, tmp_path
-):
+def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wait_until, tmp_path):
     """The recorder is there at once, the simulator seconds later; both get every pose."""
     bag = write_pose_bag(tmp_path / 'motion', two_passes(poses=300))
     replay = {'bag': bag, 'state_topic': '/atomizer/state', 'wait_for_subscribers': 2}
@@ -90,9 +88,7 @@ def test_ctrl_c_while_a_model_is_prepared_ends_it(ros_domain, call, tmp_path):
         assert simulator.wait() == 0, simulator.err
 
 
-def test_a_simulator_that_stalls_for_seconds_loses_nothing(
-    ros_domain, ros_context, spin, wait_until, onlooker, tmp_path
-):
+def test_a_stall_loses_nothing(ros_domain, ros_context, spin, wait_until, onlooker, tmp_path):
     """Stopped as by a debugger or a swapping machine, while a recorder goes on beside it."""
     robot, viewer = Robot(ros_context), onlooker(STATS)
     spin(robot)
@@ -112,9 +108,7 @@ def test_a_simulator_that_stalls_for_seconds_loses_nothing(
     assert np.array_equal(read_recording(tmp_path / 'run').stamps_ns, MOTION.stamps_ns)
 
 
-def test_a_film_is_in_doubt_while_its_recorder_is_stalled(
-    simulator, robot, ros_domain, wait_until, onlooker, tmp_path
-):
+def test_a_film_may_be_in_doubt(simulator, robot, ros_domain, wait_until, onlooker, tmp_path):
     """And once a pose was refused, until the next part."""
     node, trust = simulator(), onlooker(TRUST_TOPIC)
 

@@ -65,9 +65,7 @@ def truth(tmp_path) -> str:
     return str(tmp_path / 'truth.yaml')
 
 
-def test_the_error_falls_to_the_noise_as_the_part_is_painted(
-    comparison, robot, viewer, wait_until, truth
-):
+def test_the_error_falls_to_the_noise_while_painting(comparison, robot, viewer, wait_until, truth):
     node = comparison(model_file=truth)
     source = robot(node)
     wait_until(lambda: viewer.heard[STATS], what='the bare part')
@@ -90,9 +88,7 @@ def test_the_error_falls_to_the_noise_as_the_part_is_painted(
     assert abs(stats.worst_residual_um) < 5 * SIGMA_UM
 
 
-def test_a_better_model_set_at_run_time_lowers_the_error(
-    comparison, robot, viewer, call, wait_until, truth
-):
+def test_a_better_model_lowers_the_error(comparison, robot, viewer, call, wait_until, truth):
     """Predictions are those of an offline run in double precision, and a service says it.
 
     The surface is coloured around readings and grey elsewhere.

@@ -56,9 +56,7 @@ def made(nodes, closed):
 @pytest.mark.parametrize('name', [
     'simulator', 'comparison', 'web_view', 'recorder', 'joints', 'tf', 'trigger', 'player',
 ])  # fmt: skip
-def test_no_message_of_the_right_type_ends_a_node(
-    name, made, ros_context, spin, executor, wait_until
-):
+def test_no_odd_message_ends_a_node(name, made, ros_context, spin, executor, wait_until):
     if name == 'tf':
         pytest.importorskip('tf2_msgs')
     peer_node = Node('peer', context=ros_context)

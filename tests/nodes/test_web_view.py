@@ -96,9 +96,7 @@ def test_browsers_see_the_film_of_the_simulator(
         assert early.evaluate('page.view.segments') == 0
 
 
-def test_film_on_another_mesh_is_not_shown(
-    simulator, web_view, onlooker, robot, painted, wait_until
-):
+def test_another_mesh_shows_no_film(simulator, web_view, onlooker, robot, painted, wait_until):
     painter, viewer, looker = simulator(), web_view(max_edge_length_m=0.1), onlooker()
     robot(painter, viewer).send(two_passes(60))
     painted(painter, 60)

@@ -33,7 +33,7 @@ def publisher(cell, wait_until):
 @pytest.fixture
 def listen(ros_context, spin):
     """`listen(name)`: a node that hears the poses, running."""
-    from nodes.bags.listener import Listener
+    from nodes.bags.runs import Listener
 
     def listen(name='listener', reports=True, namespace='') -> Listener:
         listener = Listener(ros_context, name, reports, namespace)

@@ -75,8 +75,7 @@ def test_the_gun_decides_which_side_of_a_solid_is_outward(simulator, robot, pain
     assert np.array_equal(painted(node), offline_um(seen, motion, model))
 
 
-def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wait_until,
-                                                         tmp_path):  # fmt: skip
+def test_a_large_mesh_costs_a_robot_at_250_hz_no_pose(simulator, onlooker, wait_until, tmp_path):
     """100,000 triangles go out five times a second, to a subscriber, while poses come."""
     node = simulator(max_edge_length_m=0.0045, publish_rate_hz=5.0, pose_queue_depth=5000)
     assert len(node.surface.faces) > 100_000

@@ -24,15 +24,13 @@ from paint_deposition.nodes.runtime.node import ERROR, OK
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
 
 LATER_NS = 60_000_000_000
-
-
-def closed_at_its_end(motion: pd.Trajectory) -> pd.Trajectory:
-    """The gun is off when the part leaves."""
-    return replace(
-        motion,
-        trigger_stamps_ns=np.append(motion.trigger_stamps_ns, motion.stamps_ns[-1]),
-        trigger_flow=np.append(motion.trigger_flow, 0.0),
-    )
+OPEN = two_passes(poses=300)
+# The gun is off when the part leaves.
+MOTION = replace(
+    OPEN, trigger_flow=np.append(OPEN.trigger_flow, 0.0),
+    trigger_stamps_ns=np.append(OPEN.trigger_stamps_ns, OPEN.stamps_ns[-1]),
+)  # fmt: skip
+WITHOUT_TRIGGER = two_passes(poses=300, trigger=False)
 
 
 def later(motion: pd.Trajectory) -> pd.Trajectory:
@@ -41,10 +39,6 @@ def later(motion: pd.Trajectory) -> pd.Trajectory:
         stamps_ns=motion.stamps_ns + LATER_NS,
         trigger_stamps_ns=motion.trigger_stamps_ns + LATER_NS,
     )
-
-
-MOTION = closed_at_its_end(two_passes(poses=300))
-WITHOUT_TRIGGER = two_passes(poses=300, trigger=False)
 
 
 @pytest.fixture
@@ -125,10 +119,8 @@ def test_each_part_has_its_film_and_its_run(
         assert figures['poses']['received'] == len(MOTION)
 
 
-def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
-    simulated, painted, change, wider, wait_until, tmp_path
-):
-    """Closed before the change it is closed after it, and it sprays on with its brush."""
+def test_the_gun_and_its_brush_stay(simulated, painted, change, wider, wait_until, tmp_path):
+    """Closed before a change, closed after it; the brush must be in a model that is set."""
     brushes = two_brushes()
     pd.write_model(tmp_path / 'brushes.yaml', brushes)
     other = pd.DepositionModel.of_brushes([Brush(number=1, planar=brushes.planar)])
@@ -150,9 +142,7 @@ def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
     assert painted(node, len(WITHOUT_TRIGGER)).max() == 0.0
 
 
-def test_meshes_that_were_read_are_there_at_once_in_the_shape_they_have(
-    simulator, change, wider, tmp_path
-):
+def test_meshes_are_read_once_for_each_shape_they_have(simulator, change, wider, tmp_path):
     """Read ahead, or of a part that has left; one that was exported anew is read again."""
     node = simulator()
     first, third = node.mesh_file, str(write_panel(tmp_path / 'third.stl', reverse=True))
@@ -166,12 +156,11 @@ def test_meshes_that_were_read_are_there_at_once_in_the_shape_they_have(
         return np.ptp(node.points.positions_m[:, 0])
 
     assert ready() == third
-    assert change(serial='1', mesh_file=third).success
-    assert ready() == first
-    assert change(serial='2', mesh_file=wider).success
-    assert ready() == f'{first} {third}'
-    assert change(serial='3', mesh_file=first).success
-    assert ready() == f'{third} {wider}'
+    for serial, mesh, kept in (
+        ('1', third, [first]), ('2', wider, [first, third]), ('3', first, [third, wider]),
+    ):  # fmt: skip
+        assert change(serial=serial, mesh_file=mesh).success
+        assert ready().split() == kept
     # Under the name of the part in the cell, and of one that was there before.
     narrow = Path(first).read_bytes()
     shutil.copy(wider, first)
@@ -190,18 +179,16 @@ def test_a_further_coat_lies_on_the_first(simulated, painted, change, tmp_path):
     source.send(MOTION)
     once = painted(node, len(MOTION))
     assert "serial 'A-1' is the part in the cell: set coat: true" in change(serial='A-1').message
-    other = change(serial='A-2', coat=True).message
-    assert "coat: the part in the cell is 'A-1' of " in other
+    assert "the part in the cell is 'A-1' of " in change(serial='A-2', coat=True).message
     same_mesh = node.mesh_file.replace('/panel', '/../' + tmp_path.name + '/panel')
     coat = change(serial='A-1', coat=True, mesh_file=same_mesh)
-    assert coat.success, coat.message
-    assert coat.run == 'A-1_coat_2'
+    assert (coat.success, coat.run) == (True, 'A-1_coat_2'), coat.message
     source.send(later(MOTION))
     assert painted(node, 2 * len(MOTION)) == pytest.approx(2.0 * once, rel=1e-5, abs=1e-6)
     assert change(serial='A-2').success
     files = [tmp_path / 'films' / run / 'film.json' for run in ('A-1', 'A-1_coat_2')]
     figures = [json.loads(file.read_text()) for file in files]
-    assert [f['part']['coat'] for f in figures] == [1, 2]
+    assert [one['part']['coat'] for one in figures] == [1, 2]
     assert figures[1]['mean_um'] == pytest.approx(2.0 * figures[0]['mean_um'], rel=0.1)
     done_before = change(serial='A-1')
     assert not done_before.success
@@ -209,15 +196,17 @@ def test_a_further_coat_lies_on_the_first(simulated, painted, change, tmp_path):
 
 
 def test_what_cannot_be_is_refused_and_the_part_stays(simulated, painted, change, tmp_path):
-    node, source = simulated()
+    """A pose that is refused after the change costs no film."""
+    node, source = simulated(part_parent_frame='cell')
+    assert change(serial='1').success
     source.send(MOTION)
     film = painted(node, len(MOTION))
     for fields, message in (
         ({'serial': ''}, "serial '': use at most 200 letters"),
         ({'serial': '../4711'}, "serial '../4711': use at most 200"),
         ({'serial': '..'}, "serial '..': use at most"),
-        ({'serial': '1', 'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
-        ({'serial': '1', 'part_pose': [0.0, 0.0, 0.0]}, 'part_pose'),
+        ({'serial': '2', 'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
+        ({'serial': '2', 'part_pose': [0.0, 0.0, 0.0]}, 'part_pose'),
         ({'prepare': True}, 'prepare needs a mesh_file'),
     ):
         answer = change(**fields)
@@ -225,6 +214,12 @@ def test_what_cannot_be_is_refused_and_the_part_stays(simulated, painted, change
         assert message in answer.message
     assert np.array_equal(node.film.snapshot().film_um, film)
     assert not (tmp_path / 'films').exists()
+    refused = SetParametersResult(successful=False, reason='not now')
+    node.add_on_set_parameters_callback(lambda changes: refused)
+    answer = change(serial='2', part_pose=[0.0] * 6 + [1.0])
+    assert (answer.success, answer.run) == (False, '2')
+    assert 'it stands where the part before did: not now' in answer.message
+    assert saved_um(tmp_path / 'films/1/film.csv') == pytest.approx(film, rel=1e-7)
 
 
 def test_a_film_is_kept_until_it_is_on_disk(simulated, painted, change, tmp_path):
@@ -258,25 +253,9 @@ def test_a_film_is_kept_until_it_is_on_disk(simulated, painted, change, tmp_path
     assert not node.configured
 
 
-def test_a_pose_that_is_refused_after_the_change_costs_no_film(simulated, painted, change,
-                                                               tmp_path):  # fmt: skip
-    node, source = simulated(part_parent_frame='cell')
-    assert change(serial='1').success
-    source.send(MOTION)
-    painted(node, len(MOTION))
-    refused = SetParametersResult(successful=False, reason='not now')
-    node.add_on_set_parameters_callback(lambda changes: refused)
-    answer = change(serial='2', part_pose=[0.0] * 6 + [1.0])
-    assert (answer.success, answer.run) == (False, '2')
-    assert 'it stands where the part before did: not now' in answer.message
-    assert (tmp_path / 'films/1/film.csv').is_file()
-
-
 @pytest.mark.parametrize(('pose', 'frame'), [([], 'part'), ([0.0] * 6 + [1.0], 'cell')])
-def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulated, painted, asked,
-                                                               wait_until, tmp_path, pose,
-                                                               frame):  # fmt: skip
-    """Poses that came while the next mesh was read are painted where the old part stands."""
+def test_a_change_that_fails_is_none(simulated, painted, asked, wait_until, tmp_path, pose, frame):
+    """Pose and poses that came meanwhile are left to the old part."""
     node, source = simulated(part_pose=pose, part_parent_frame='cell')
     large, broken = write_panel(tmp_path / 'large.stl', scale=8.0), tmp_path / 'broken.stl'
     broken.write_text('no mesh')
@@ -330,9 +309,7 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
     assert second.max() > 1.0
 
 
-def test_a_pose_that_comes_while_the_film_is_reset_is_of_the_run_that_begins(
-    simulated, painted, change, monkeypatch
-):
+def test_a_pose_during_a_reset_is_of_the_run_that_begins(simulated, painted, change, monkeypatch):
     (node, source), reset = simulated(), LiveFilms.reset
     assert change(serial='1').success
     source.send(WITHOUT_TRIGGER, slice(0, 10))
@@ -351,9 +328,7 @@ def test_a_pose_that_comes_while_the_film_is_reset_is_of_the_run_that_begins(
 
 
 @pytest.mark.parametrize('placed', [True, False])
-def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
-    simulator, robot, painted, asked, wait_until, placed
-):
+def test_poses_that_wait_are_of_their_part(simulator, robot, painted, asked, wait_until, placed):
     """The change waits for them; without a transform they are refused on their own part."""
     node = simulator()
     # A cell in which transforms may come.

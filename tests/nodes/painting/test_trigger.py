@@ -34,11 +34,11 @@ def test_a_state_of_which_only_spraying_is_filled_sprays(simulated, painted, onl
     wait_until(lambda: viewer.reports(POSES, '1 states that spray with flow 0', b'\x01'))
 
 
-def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, spin, wait_until,
-                                                        painted):  # fmt: skip
+def test_a_latched_trigger_counts(simulator, ros_context, spin, wait_until, painted, capfd):
     """The gun was closed before the node was there, and stays closed: no paint.
 
-    It is heard beside a robot that sends by best effort and keeps nothing, which is heard as well.
+    It is heard beside a robot that sends by best effort and keeps nothing, which is heard as well:
+    neither side reports that the other does not fit.
     """
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     gun = Node('gun', context=ros_context)
@@ -50,10 +50,13 @@ def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, 
     node = simulator()
     wait_until(lambda: source.has_subscribers(1), what='discovery')
     wait_until(lambda: node.film.guns[0].flow == 0.0, what='the latched state')
-    for row in range(len(UNTRIGGERED)):
-        source.send(UNTRIGGERED, slice(row, row + 1))
-        painted(node, row + 1)
-    assert painted(node).max() == 0.0
+    said = capfd.readouterr().err
+    assert 'ready' in said
+    assert not {'[WARN]', '[ERROR]'} & set(said.split())
+    for count in range(1, 61):  # one by one, or the middleware may drop some
+        source.send(UNTRIGGERED, slice(99 + count, 100 + count))
+        film = painted(node, count)
+    assert film.max() == 0.0
     for publisher, flow in ((states, 0.5), (source.state_publisher, 0.25)):
         at = header('', int(UNTRIGGERED.stamps_ns[-1]))
         publisher.publish(AtomizerState(header=at, spraying=True, flow=flow))
@@ -76,9 +79,7 @@ def test_what_leaves_the_part_bare_is_reported(simulated, onlooker, wait_until):
     wait_until(lambda: viewer.reports(POSES.replace('poses', 'part'), bare, b'\x01'))
 
 
-def test_each_robot_is_heard_as_reliably_as_it_sends(
-    simulator, ros_context, spin, painted, wait_until, still
-):
+def test_robots_are_heard_as_they_send(simulator, ros_context, spin, painted, wait_until, still):
     """A best-effort robot beside a reliable one, of which no pose may be lost for that."""
     node = simulator(pose_queue_depth=5000)
     first = Robot(ros_context)
@@ -108,20 +109,6 @@ def test_each_robot_is_heard_as_reliably_as_it_sends(
     assert 310 < row < 599
     wait_until(lambda: node.film.counts.received == 600, what='all poses')
     assert node.film.counts.rejected == node.inputs[0].messages_lost == 0
-
-
-def test_a_best_effort_robot_that_is_there_is_not_asked_for_more(
-    simulator, ros_context, spin, onlooker, wait_until, capfd
-):
-    """Neither side reports, at the start, that the other does not fit."""
-    source = Robot(ros_context, reliable=False)
-    spin(source)
-    node, viewer = simulator(), onlooker()
-    wait_until(lambda: source.is_subscribed_by(node))
-    wait_until(lambda: viewer.reports(POSES, 'waiting for poses', b'\x00'))
-    said = capfd.readouterr().err
-    assert 'ready' in said
-    assert not {'[WARN]', '[ERROR]'} & set(said.split())
 
 
 def test_a_bool_as_the_state_is_an_error(simulator, onlooker, ros_domain, wait_until):

@@ -90,9 +90,7 @@ def stamps_from_now() -> np.ndarray:
     return time.time_ns() + 4_000_000 * np.arange(len(WAY))
 
 
-def test_a_driver_that_returns_with_another_quality_of_service_is_heard(
-    source, ros_context, spin, wait_until
-):
+def test_a_driver_that_returns_another_way_is_heard(source, ros_context, spin, wait_until):
     node = source()
     for count, quality in ((1, ReliabilityPolicy.RELIABLE), (2, ReliabilityPolicy.BEST_EFFORT)):
         driver = Driver(ros_context, reliability=quality)
@@ -187,9 +185,7 @@ def test_joint_states_that_are_refused_from_then_on_are_told(monkeypatch):
     assert 'wrist_roll' in status.message
 
 
-def test_a_trigger_alone_switches_a_robot_that_publishes_poses(
-    source, ros_context, spin, wait_until, viewer, switched
-):
+def test_a_trigger_alone_switches_the_gun(source, ros_context, spin, wait_until, viewer, switched):
     """Poses of its own, a Bool of the PLC: sent when it says, unless the clocks differ."""
     node = source(urdf_file='', trigger='/gun')
     robot, place = cell.Robot(ros_context), (np.zeros(3), cell.FACING_PANEL, 'cell')

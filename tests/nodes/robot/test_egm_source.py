@@ -139,13 +139,10 @@ def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(start, onlo
     wait_until(lambda: viewer.reports('egm_source: robot', '2 packets lost, 1 repeated'))
 
 
-@pytest.mark.parametrize(
-    ('axes', 'placed', 'told'),
-    [
-        (3, True, 'packets have 2 external axes'),
-        (0, False, 'packets have no pose: give EGM a tool'),
-    ],
-)
+@pytest.mark.parametrize(('axes', 'placed', 'told'), [
+    (3, True, 'packets have 2 external axes'),
+    (0, False, 'packets have no pose: give EGM a tool'),
+])  # fmt: skip
 def test_what_packets_lack_is_told(start, onlooker, wait_until, monkeypatch, axes, placed, told):
     names = [f'axis_{k}' for k in range(axes)]
     node = start(

@@ -62,8 +62,7 @@ def told(viewer) -> str:
 
 
 @needs_tf
-def test_poses_are_those_of_the_bell_at_the_stamps_of_the_transforms(broadcaster, viewer,
-                                                                     wait_until):  # fmt: skip
+def test_poses_of_the_bell_have_the_stamps_of_transforms(broadcaster, viewer, wait_until):
     """A rail that tells its place at a fifth of the arm's rate, and late."""
     broadcaster.send(START_NS, static=True, flange_to_tool0=FLANGE)
     stamps = [START_NS + STEP_NS * row for row in range(51)]
