@@ -140,21 +140,20 @@ def test_a_part_on_a_conveyor_is_followed(tmp_path):
 @pytest.mark.slow
 def test_campaigns_place_each_part(panel, tmp_path):
     """One by its own key, the other by the option for those without; both match the film."""
-    bag = write_pose_bag(tmp_path / 'run', seen_from_the_robot())
-    own = write_pose_bag(tmp_path / 'own', level_pass(frame_id='part'))
+    bag = str(write_pose_bag(tmp_path / 'run', seen_from_the_robot()))
+    own = str(write_pose_bag(tmp_path / 'own', level_pass(frame_id='part')))
     rows = [f'{x:.3f},0,{z},9' for x in np.linspace(-0.4, 0.4, 9) for z in (0.05, -0.05)]
     (tmp_path / 'readings.csv').write_text('\n'.join(['x_m,y_m,z_m,thickness_um', *rows]))
 
-    def positions(entry: dict, part_pose=None) -> np.ndarray:
+    def positions(of_others=None, **entry) -> np.ndarray:
         entry |= {'mesh': str(panel), 'measurements': 'readings.csv'}
         (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump({'experiments': [entry]}))
-        read = pd.read_campaign(tmp_path / 'campaign.yaml', part_pose=part_pose)
+        read = pd.read_campaign(tmp_path / 'campaign.yaml', part_pose=of_others)
         return read.experiments[0].path.position_m
 
-    expected = positions({'trajectory': str(own)})
-    placed = positions({'trajectory': str(bag), 'part_pose': PART_POSE})
-    assert np.allclose(placed, expected, atol=1e-6)
-    assert np.array_equal(positions({'trajectory': str(bag)}, PART_POSE), placed)
+    placed = positions(trajectory=bag, part_pose=PART_POSE)
+    assert np.allclose(placed, positions(trajectory=own), atol=1e-6)
+    assert np.array_equal(positions(PART_POSE, trajectory=bag), placed)
 
 
 @pytest.fixture

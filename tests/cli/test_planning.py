@@ -131,17 +131,11 @@ COARSE = ('--max-edge-length-m', 0.06)
 RECORDED = ('--mesh', DOOR_MESH, '--trajectory', BAG, '--state-topic', '/atomizer/state', *COARSE)
 
 
-@pytest.fixture(scope='module')
-def improved(tmp_path_factory):
-    """The recorded door improved, with what was printed."""
-    folder = tmp_path_factory.mktemp('improved') / 'out'
-    done = ran('improve', *RECORDED, '--json', '-o', folder)
-    return folder, json.loads(done.stdout)
-
-
 @pytest.mark.slow
-def test_files_and_figures(improved):
-    folder, figures = improved
+def test_the_improved_film_is_that_of_the_written_files(tmp_path):
+    """The bag to the last digits, module and table within what the command says of them."""
+    folder = tmp_path / 'out'
+    figures = figures_of('improve', *RECORDED, '--json', '-o', folder)
     assert figures['sigma_n']['after'] < 0.8 * figures['sigma_n']['before']
     assert figures['mean_um']['after'] == pytest.approx(figures['mean_um']['before'], rel=0.01)
     assert figures['program_difference'] < 2e-3
@@ -151,12 +145,6 @@ def test_files_and_figures(improved):
     for name in ('trajectory', 'passes.csv', 'passes.mod', 'model.yaml', 'film.ply'):
         assert (folder / name).exists()
     assert is_picture(folder / 'improvement.png', 1000)
-
-
-@pytest.mark.slow
-def test_the_film_is_that_of_the_written_files(improved):
-    """The bag to the last digits, module and table within what the command says of them."""
-    folder, figures = improved
     surface = pd.read_mesh(DOOR_MESH, max_edge_length_m=COARSE[1])
     model = pd.read_model(folder / 'model.yaml')
     expected = film_in(folder)
@@ -185,18 +173,12 @@ UNPAINTED = ('--mesh', SAMPLES / 'door.stl', '--max-edge-length-m', 0.05)
 PAINTED = (*UNPAINTED, '--trajectory', SAMPLES / 'door_horizontal')
 
 
-@pytest.fixture(scope='module')
-def measured(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('measured')
-    done = ran('measure', *PAINTED, '--points', 30, '-o', folder)
-    return folder, done
-
-
 @pytest.mark.slow
-def test_points_are_written_for_people_and_robots(measured):
-    folder, done = measured
-    figures = told_in(folder / 'measure.json')
-    rows, poses = rows_of(folder / 'points.csv'), rows_of(folder / 'poses.csv')
+def test_points_are_written_for_people_and_robots(tmp_path):
+    """The filled table is gauge readings, and the empty one is refused."""
+    done = ran('measure', *PAINTED, '--points', 30, '-o', tmp_path)
+    figures = told_in(tmp_path / 'measure.json')
+    rows, poses = rows_of(tmp_path / 'points.csv'), rows_of(tmp_path / 'poses.csv')
     named = [point['point'] for point in figures['points']]
     assert [row['point'] for row in rows] == named + figures['read_twice']
     assert len(poses) == len(figures['points']) == 30
@@ -204,17 +186,10 @@ def test_points_are_written_for_people_and_robots(measured):
     for pose, point in zip(poses, figures['points'], strict=True):
         turn = Rotation.from_quat([float(pose[q]) for q in ('qx', 'qy', 'qz', 'qw')])
         np.testing.assert_allclose(turn.apply([0, 0, 1]), -np.array(point['normal']), atol=1e-6)
-    assert is_picture(folder / 'points.png', 1000)
-
-
-@pytest.mark.slow
-def test_the_filled_table_is_gauge_readings_and_the_empty_one_is_refused(measured, tmp_path):
-    folder, _ = measured
-    surface, path = pd.read_mesh(SAMPLES / 'door.stl'), tmp_path / 'readings.csv'
-    path.write_text((folder / 'points.csv').read_text())
+    assert is_picture(tmp_path / 'points.png', 1000)
+    surface, path = pd.read_mesh(SAMPLES / 'door.stl'), tmp_path / 'points.csv'
     with pytest.raises(ReadingsError, match='no readings below the header'):
         pd.read_readings(path, surface=surface)
-    rows = rows_of(path)
     with path.open('w', newline='') as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()

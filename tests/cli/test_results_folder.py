@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from contextlib import nullcontext
 from multiprocessing import get_context
 
@@ -151,23 +152,22 @@ def test_results_are_the_old_or_the_new_wherever_a_command_ends(tmp_path, end, o
     assert len(states) == 2, states
 
 
-def test_commands_on_one_folder_take_turns(tmp_path):
-    code = """
-import sys
-from pathlib import Path
-from paint_deposition.cli.results import results_in
-for _ in range(40):
-    with results_in(Path(sys.argv[1])) as work:
-        for k in range(5):
-            (work / f'{sys.argv[2]}{k}').write_text(sys.argv[2])
-"""
-    words = [sys.executable, '-c', code, str(tmp_path / 'out')]
+def test_commands_on_one_folder_take_turns(tmp_path, monkeypatch):
     (tmp_path / 'temporary').mkdir()
-    system = {**os.environ, 'TMPDIR': str(tmp_path / 'temporary')}
-    running = [subprocess.Popen([*words, name], env=system) for name in 'abc']
-    assert [one.wait() for one in running] == [0, 0, 0]
-    held = names_in(tmp_path / 'out')
-    assert held in ([f'{name}{k}' for k in range(5)] for name in 'abc')
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path / 'temporary'))
+    results = [[f'{name}{k}' for k in range(5)] for name in 'abc']
+
+    def write_often(names: list[str]) -> None:
+        for _ in range(40):
+            write(tmp_path / 'out', *names)
+
+    running = [get_context('fork').Process(target=write_often, args=[each]) for each in results]
+    for command in running:
+        command.start()
+    for command in running:
+        command.join()
+    assert [command.exitcode for command in running] == [0, 0, 0]
+    assert names_in(tmp_path / 'out') in results
     assert names_in(tmp_path / 'temporary') == []
 
 

@@ -9,17 +9,7 @@ import yaml
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import (
-    COARSE,
-    TRIGGER,
-    assert_refused,
-    film_in,
-    level_pass,
-    paint,
-    ran,
-    rows_of,
-    told_in,
-)
+from cli.command import COARSE, assert_refused, film_in, level_pass, paint, ran, rows_of, told_in
 from paint_deposition.cli.results import MARKER
 from paint_deposition.effects.library.gauge_gain import GaugeGain
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -31,21 +21,15 @@ DOOR, DOOR_BAG = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
 FILES = [MARKER, 'film.csv', 'film.ply', 'film.png', 'stats.json']
 
 
-@pytest.fixture(scope='module')
-def painted_door(tmp_path_factory):
-    """The sample door, painted along the sample recording, and what the command printed."""
-    folder = tmp_path_factory.mktemp('door') / 'new' / 'folder'
-    done = ran(
-        'simulate', '--mesh', DOOR, '--trajectory', DOOR_BAG, *TRIGGER, '--json', '-o', folder,
-        '--target-um', 18, '--tolerance-um', 4,
-    )  # fmt: skip
-    assert done.stderr == ''
-    return folder, json.loads(done.stdout)
-
-
 @pytest.mark.slow
-def test_the_door_is_painted(painted_door):
-    folder, figures = painted_door
+def test_the_door_is_painted_and_figures_say_how(tmp_path):
+    folder = tmp_path / 'new' / 'folder'
+    done = ran(
+        'simulate', '--mesh', DOOR, '--trajectory', DOOR_BAG, '--state-topic', '/atomizer/state',
+        '--json', '-o', folder, '--target-um', 18, '--tolerance-um', 4,
+    )  # fmt: skip
+    figures = json.loads(done.stdout)
+    assert done.stderr == ''
     assert sorted(file.name for file in folder.iterdir()) == FILES
     assert told_in(folder / 'stats.json') == figures
     assert list(rows_of(folder / 'film.csv')[0]) == ['x_m', 'y_m', 'z_m', 'thickness_um']
@@ -58,11 +42,6 @@ def test_the_door_is_painted(painted_door):
     in_mesh = np.ravel(mesh.metadata['_ply_raw']['vertex']['data']['thickness_um'])
     assert np.allclose(in_mesh, film, rtol=1e-6)
     assert (folder / 'film.png').read_bytes().startswith(b'\x89PNG')
-
-
-@pytest.mark.slow
-def test_the_figures_say_how_it_was_painted(painted_door):
-    _, figures = painted_door
     recorded = pd.read_recording(DOOR_BAG, None, '/atomizer/state')
     assert (figures['poses']['received'], figures['poses']['rejected']) == (len(recorded), 0)
     changes = recorded.trigger_stamps_ns[1:]

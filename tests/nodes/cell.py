@@ -2,6 +2,7 @@
 
 import socket
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
+from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState, PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -25,7 +28,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.runtime.topics import LATCHED, PROGRESS, RESULTS, TRUST_TOPIC
+from paint_deposition.nodes.runtime.topics import CLOCK, LATCHED, PROGRESS, RESULTS, TRUST_TOPIC
 
 START_NS = 1_760_000_000_000_000_000
 # The tool's z axis along +y, toward a panel that looks to -y.
@@ -47,7 +50,7 @@ HEARD = {
     'comparison/stats': (paint.ComparisonStats, LATCHED),
     'comparison/mesh': (Marker, LATCHED), 'comparison/legend': (MarkerArray, LATCHED),
     'deposition_simulator/transition_event': (TransitionEvent, ALL),
-    'diagnostics': (DiagnosticArray, QoSProfile(depth=100)),
+    'diagnostics': (DiagnosticArray, QoSProfile(depth=100)), 'clock': (Clock, CLOCK),
 }  # fmt: skip
 # A user's effect whose code is new for every number, so that no cache has it compiled. Before it
 # is used it waits for a file `gate`; in a main thread, which poses may be waiting for, it fails.
@@ -110,6 +113,14 @@ def two_passes(poses: int = TWO_PASSES_POSES, trigger: bool = True) -> Trajector
         else np.empty(0, dtype=np.int64),
         trigger_flow=np.array([1.0, 0.0, 1.0]) if trigger else np.empty(0),
     )
+
+
+def turned(motion: Trajectory, degrees: float) -> Trajectory:
+    """The motion turned about the vertical z."""
+    turn = Rotation.from_euler('z', degrees, degrees=True)
+    quaternions = (turn * Rotation.from_quat(motion.quaternions_xyzw)).as_quat()
+    places = turn.apply(motion.positions_m)
+    return replace(motion, positions_m=places, quaternions_xyzw=quaternions)
 
 
 def offline_um(

@@ -133,11 +133,9 @@ def test_passes_are_planned_and_latched(planner, pursue, viewer, wait_until, tmp
 
     status, result, heard = pursue(mesh_file=str(mesh), target_um=15.0, direction='vertical')
     assert status == GoalStatus.STATUS_SUCCEEDED, result.message
-    expected = plan(
-        pd.read_mesh(mesh, max_edge_length_m=0.05),
-        pd.DepositionModel(),
-        PlanRequest(direction='vertical', target_um=15.0),
-    )
+    surface = pd.read_mesh(mesh, max_edge_length_m=0.05)
+    wanted = PlanRequest(direction='vertical', target_um=15.0)
+    expected = plan(surface, pd.DepositionModel(), wanted)
     assert result.message == expected.sentence
     assert (result.passes, result.mean_um) == (len(expected.passes), expected.mean_um)
     assert result.speed_m_per_s == expected.style.speed_m_per_s

@@ -1,6 +1,7 @@
 """The journeys that `docs/architecture.md` lists run through the files in the order it gives."""
 
 import re
+import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -74,3 +75,15 @@ def test_a_pose_passes_the_files_of_its_journey(entered, simulator, robot, wait_
     entered.pop('nodes/painting/film_display.py', None)
     wait_until(lambda: 'nodes/painting/film_display.py' in entered, what='the display')
     assert_passes(journey(repository, 'a live pose'), entered)
+
+
+@pytest.mark.slow
+def test_a_folder_that_is_no_demo_is_left_alone(repository: Path, tmp_path):
+    (tmp_path / 'readings').mkdir()
+    (tmp_path / 'readings/door.csv').write_text('years of work')
+    command = [sys.executable, repository / 'demo/demo.py', tmp_path]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100)
+    assert (done.returncode, done.stdout) == (2, '')
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f'demo: {tmp_path} exists and is not from an older demo; ')
+    assert (tmp_path / 'readings/door.csv').read_text() == 'years of work'

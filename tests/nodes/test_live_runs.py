@@ -1,6 +1,7 @@
 """Nodes as processes, as in a cell: a bag is replayed, painted and saved; one of them stalls."""
 
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,14 +10,11 @@ from paint_msgs.srv import SaveFilm
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 
-from nodes.cell import Robot, parameters, saved_um, two_passes, write_own_model
+from nodes.cell import Robot, offline_um, parameters, saved_um, two_passes, write_own_model
 from nodes.processes import NodeProcess, recorder_process, simulator_process
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.topics import TRUST_TOPIC, header
 
@@ -56,11 +54,11 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
     assert len(read_recording(tmp_path / 'run')) == 300
     live_um = saved_um(tmp_path / 'film.csv')
     surface = read_mesh(tmp_path / 'panel.stl', 1.0, EDGE_M)
-    integrator = FilmIntegrator(surface.points(), DepositionModel(), 'double')
-    integrator.add(spray_path(read_recording(bag, None, '/atomizer/state'))[0])
-    offline_um = integrator.film_um
-    assert offline_um.max() > 1.0
-    assert np.abs(live_um - offline_um).max() < 1e-6 * offline_um.max()
+    seen = SimpleNamespace(points=surface.points(), surface=surface)
+    motion = read_recording(bag, None, '/atomizer/state')
+    expected_um = offline_um(seen, motion, precision='double')
+    assert expected_um.max() > 1.0
+    assert np.abs(live_um - expected_um).max() < 1e-6 * expected_um.max()
 
 
 def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(ros_domain, onlooker, wait_until, tmp_path):

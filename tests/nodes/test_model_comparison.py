@@ -27,16 +27,13 @@ def readings(tmp_path):
     """A file of forty noisy readings of the true film, each place measured twice."""
     rng = np.random.default_rng(11)
     surface = pd.read_mesh(write_panel(tmp_path / 'panel.stl'), 1.0, 0.05)
-    places = np.column_stack(
-        [rng.uniform(-0.25, 0.25, 20), np.zeros(20), rng.uniform(-0.25, 0.25, 20)]
-    )
-    integrator = FilmIntegrator(surface.at(places), TRUTH, 'double')
+    x, z = rng.uniform(-0.25, 0.25, (2, 20))
+    integrator = FilmIntegrator(surface.at(np.stack([x, 0 * x, z], axis=1)), TRUTH, 'double')
     integrator.add(spray_path(MOTION)[0])
     lines = [['x_m', 'y_m', 'z_m', 'thickness_um', 'point', 'sigma_um']]
-    for number, (place, film) in enumerate(zip(places, integrator.gauge_um, strict=True)):
-        for _ in range(2):
-            reading = film + rng.normal(scale=SIGMA_UM)
-            lines.append([*(f'{c:.6f}' for c in place), f'{reading:.4f}', number, SIGMA_UM])
+    for row in np.repeat(np.arange(20), 2).tolist():
+        reading = integrator.gauge_um[row] + rng.normal(scale=SIGMA_UM)
+        lines.append([f'{x[row]:.6f}', 0, f'{z[row]:.6f}', f'{reading:.4f}', row, SIGMA_UM])
     path = tmp_path / 'readings.csv'
     write_table(path, lines)
     return path

@@ -48,9 +48,8 @@ def test_browsers_see_the_film_of_the_simulator(
 
     def shows(tab, film_um) -> bool:
         shown = np.array(tab.evaluate('Array.from(page.view.film ?? [])'))
-        return len(shown) == len(film_um) and np.allclose(
-            shown, film_um, rtol=2**-11, atol=STEP_UM / 2
-        )
+        within = {'rtol': 2**-11, 'atol': STEP_UM / 2}
+        return len(shown) == len(film_um) and np.allclose(shown, film_um, **within)
 
     with Chromium(tmp_path / 'browser') as browser:
         early = browser.tab(viewer.page.url)

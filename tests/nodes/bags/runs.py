@@ -36,10 +36,8 @@ def finish(recorder: RunRecorder) -> dict:
 
 def counts(information: dict) -> dict[str, int]:
     """Messages by topic, but for what the nodes say of themselves."""
-    found = {
-        entry['topic_metadata']['name']: entry['message_count']
-        for entry in information['topics_with_message_count']
-    }
+    found = {entry['topic_metadata']['name']: entry['message_count']
+             for entry in information['topics_with_message_count']}  # fmt: skip
     of_nodes = ('/diagnostics', '/parameter_events')
     return {name: count for name, count in found.items() if name not in of_nodes}
 
@@ -61,29 +59,14 @@ class Listener(Node):
         super().__init__(name, context=context, namespace=namespace)
         self.poses: list[bytes] = []
         self.states: list[AtomizerState] = []
-        self.order: list[str] = []
-        self.reports = reports
-        self.create_subscription(
-            PoseStamped, 'atomizer/pose', self.take_pose, QoSProfile(depth=5_000), raw=True
-        )
-        self.create_subscription(
-            AtomizerState, 'atomizer/state', self.take_state, QoSProfile(depth=5_000)
-        )
-        self.publisher = (
-            self.create_publisher(PoseProgress, 'atomizer/progress', topics.PROGRESS)
-            if reports is not None
-            else None
-        )
+        whole, take = QoSProfile(depth=5_000), self.poses.append
+        self.create_subscription(PoseStamped, 'atomizer/pose', take, whole, raw=True)
+        self.create_subscription(AtomizerState, 'atomizer/state', self.states.append, whole)
+        if reports is not None:
+            progress = 'atomizer/progress', topics.PROGRESS
+            self.publisher = self.create_publisher(PoseProgress, *progress)
         if reports:
             self.create_timer(0.05, self.report)
-
-    def take_pose(self, cdr: bytes) -> None:
-        self.poses.append(cdr)
-        self.order.append('pose')
-
-    def take_state(self, state: AtomizerState) -> None:
-        self.states.append(state)
-        self.order.append('state')
 
     def report(self) -> None:
         reporter = self.get_fully_qualified_name()

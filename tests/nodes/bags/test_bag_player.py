@@ -1,15 +1,14 @@
 """Replay over real DDS: the recorded bytes in the recorded order and their time, at any speed."""
 
+import threading
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
-from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from files.recorded import START_NS, STATE_TYPES, Messages, pose_entries, straight_pass, write_bag
@@ -19,7 +18,7 @@ from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.bags.pace import LOST_TIMEOUT_S, NO_REPORT_TIMEOUT_S, FlowControl
 from robot_arm import JOINTS, URDF, sweep
 
 
@@ -186,34 +185,33 @@ def test_a_bag_that_breaks_off_later_ends_the_process(ros_domain, listen, wait_u
         assert f'run: paint recover {bag}' in process.err
 
 
+def ticks(viewer) -> list[int]:
+    """The times [ns] on /clock."""
+    return [Time.from_msg(message.clock).nanoseconds for message in viewer.all('/clock')]
+
+
 @pytest.fixture
-def clock_ticks(ros_context, spin):
-    """`clock_ticks()`: a list that fills with the times [ns] on /clock."""
+def watch(onlooker, wait_until):
+    """`watch()`: who has heard the clock."""
 
-    def clock_ticks(name='clock_watch') -> list[int]:
-        node = Node(name, context=ros_context)
-        ticks = []
+    def watch():
+        viewer = onlooker('/clock')
+        wait_until(lambda: len(viewer.heard['/clock']) > 5, what='the clock')
+        return viewer
 
-        def hear(message: Clock) -> None:
-            ticks.append(Time.from_msg(message.clock).nanoseconds)
-
-        node.create_subscription(Clock, '/clock', hear, topics.CLOCK)
-        spin(node)
-        return ticks
-
-    return clock_ticks
+    return watch
 
 
-def test_the_clock_runs_on_through_a_gap(play, listen, clock_ticks, wait_until, tmp_path):
+def test_the_clock_runs_on_through_a_gap(play, listen, onlooker, wait_until, tmp_path):
     written = straight_pass(60, triggers=False)
     stamps_ns = written.stamps_ns.copy()
     stamps_ns[30:] += 2 * 10**9
     bag = write_pose_bag(tmp_path / 'pass', replace(written, stamps_ns=stamps_ns))
-    ticks = clock_ticks()
+    viewer = onlooker('/clock')
     listen()
     player = play(bag, rate=2.0)
     wait_until(player.finished.done, what='the end of the replay')
-    bag_ns = np.array(ticks)
+    bag_ns = np.array(ticks(viewer))
     assert (np.diff(bag_ns) >= 0).all()
     assert bag_ns[0] == stamps_ns[0]
     assert bag_ns[-1] >= stamps_ns[-1]
@@ -222,24 +220,70 @@ def test_the_clock_runs_on_through_a_gap(play, listen, clock_ticks, wait_until, 
 
 
 @pytest.mark.parametrize('rate', [1.0, 0.0])
-def test_the_clock_stands_before_the_start_and_while_paused(
-    onlooker, play, listen, clock_ticks, call, wait_until, pass_bag, rate
-):
-    """Also for who comes late; it begins to run with the first pose."""
-    tell, ticks = partial(call, onlooker(), Trigger), clock_ticks()
+def test_the_clock_stands_meanwhile(play, listen, watch, call, wait_until, pass_bag, rate):
+    """Before the start and while paused, also for who comes late; it runs with the first pose."""
     player = play(pass_bag, rate=rate, window=50)
-    wait_until(lambda: len(ticks) > 5, what='the clock')
-    early = clock_ticks('early')
-    wait_until(lambda: len(early) > 5, what='the clock')
+    viewer = watch()
+    tell = partial(call, viewer, Trigger)
+    early = ticks(viewer) + ticks(watch())
     assert player.poses_published == 0
-    assert set(ticks + early) == {straight_pass(700).stamps_ns[0]}
+    assert set(early) == {straight_pass(700).stamps_ns[0]}
     listen(reports=None if rate else False)
     wait_until(lambda: player.poses_published >= 20, what='poses')
     assert tell('bag_player/pause').success
-    late = clock_ticks('late')
-    wait_until(lambda: len(late) > 5, what='the clock')
-    assert len(set(late)) == 1
+    (paused_ns,) = set(ticks(watch()))
     assert tell('bag_player/resume').success
     if rate:
-        wait_until(lambda: ticks[-1] > late[0] + 10**8, what='the time of the replay')
-        assert ticks == sorted(ticks)
+        wait_until(lambda: ticks(viewer)[-1] > paused_ns + 10**8, what='the time of the replay')
+        assert ticks(viewer) == sorted(ticks(viewer))
+
+
+@pytest.fixture
+def window(cell):
+    """The control of a publisher of poses."""
+    publisher = cell.create_publisher(PoseStamped, 'atomizer/pose', 10)
+    return FlowControl(cell, publisher, 200, threading.Event())
+
+
+def published(window: FlowControl, stamps, now_s: float = 0.0) -> None:
+    for stamp in stamps:
+        window.add_sent(stamp, now_s)
+
+
+def test_lost_poses_are_not_waited_for_while_reports_arrive(window):
+    window.set_subscribers(['simulator'], 0.0)
+    published(window, range(10))
+    now_s = 0.0
+    while now_s < LOST_TIMEOUT_S:
+        window.report('simulator', 6, now_s)
+        assert window.lag(now_s) == {'simulator': 3}
+        now_s += 0.2
+    window.report('simulator', 6, now_s + 0.2)
+    assert window.lag(now_s + 0.2) == {}
+    assert window.subscribers['simulator'].lost == 3
+
+
+def test_a_subscriber_that_never_reports_is_not_waited_for(window):
+    """The others are waited for as before."""
+    window.set_subscribers(['mute', 'simulator'], 0.0)
+    published(window, range(10))
+    window.report('simulator', 7, 0.0)
+    assert window.lag(NO_REPORT_TIMEOUT_S - 0.1) == {'mute': 10, 'simulator': 2}
+    assert window.lag(NO_REPORT_TIMEOUT_S + 0.1) == {'simulator': 2}
+    assert window.subscribers['mute'].never_reported
+    published(window, range(10, 25), now_s=40.0)
+    window.report('simulator', 24, 40.0)
+    window.report('mute', 21, 40.0)
+    assert window.lag(40.0) == {'mute': 3}
+
+
+def test_only_present_subscribers_are_waited_for(window):
+    window.set_subscribers(['doomed', 'survivor'], 0.0)
+    published(window, range(10))
+    window.report('survivor', 9, 0.0)
+    assert window.lag(0.0) == {'doomed': 10}
+    window.set_subscribers(['late', 'survivor'], 0.0)
+    assert window.lag(0.0) == {}
+    published(window, range(10, 15))
+    window.report('survivor', 14, 0.0)
+    assert window.lag(0.0) == {'late': 5}

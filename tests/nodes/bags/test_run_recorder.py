@@ -19,7 +19,7 @@ from std_msgs.msg import Bool, String
 
 import paint_deposition as pd
 from files.recorded import START_NS, straight_pass
-from nodes.bags.runs import NUMBERED, UNCOUNTED, counts, finish, messages, offered, pose
+from nodes.bags import runs
 from nodes.cell import FACING_PANEL, Robot, parameters
 from nodes.processes import recorder_process
 from paint_deposition.errors import RecordingError
@@ -42,12 +42,10 @@ def test_every_byte_of_a_replay_is_recorded(play, record, wait_until, tmp_path):
     recorder = record()
     player = play(bag, rate=0.0, state_topic='/atomizer/state')
     wait_until(player.finished.done, what='the end of the replay')
-    information = finish(recorder)
-    assert counts(information)['/atomizer/pose'] == 900
-    assert counts(information)['/atomizer/state'] == 2
-    assert [m for m in messages(recorder.run.folder) if m[0] == '/atomizer/pose'] == [
-        m for m in messages(bag) if m[0] == '/atomizer/pose'
-    ]
+    information = runs.finish(recorder)
+    assert runs.counts(information)['/atomizer/pose'] == 900
+    assert runs.counts(information)['/atomizer/state'] == 2
+    assert runs.recorded(recorder.run.folder) == runs.recorded(bag)
     again = pd.read_recording(recorder.run.folder, None, '/atomizer/state')
     for name in ('stamps_ns', 'positions_m', 'trigger_stamps_ns', 'trigger_flow'):
         np.testing.assert_array_equal(getattr(again, name), getattr(written, name))
@@ -65,11 +63,11 @@ def test_latched_messages_and_changed_parameters_are_recorded(record, start, cel
     wait_until(events.get_subscription_count, what='the subscription')
     assert planner.set_parameters(parameters(width_m=0.75))[0].successful
     wait_until(lambda: counts.get('/parameter_events', 0) >= 1, what='the event')
-    information = finish(recorder)
-    (profile,) = offered(information, '/thickness/stats')
+    information = runs.finish(recorder)
+    (profile,) = runs.offered(information, '/thickness/stats')
     assert profile['durability'] == 'transient_local'
     assert profile['reliability'] == 'reliable'
-    data = dict(messages(recorder.run.folder))['/thickness/stats']
+    data = dict(runs.messages(recorder.run.folder))['/thickness/stats']
     # Not byte by byte: what pads a message is left as it was in memory.
     assert deserialize_message(data, ThicknessStats) == ThicknessStats(mean_um=41.5)
     with open_bag(recorder.run.folder) as bag:
@@ -83,23 +81,23 @@ def test_a_weaker_publisher_leaves_poses_in_their_order(record, publisher, cell,
     """Those that are in the queue come before those that a second subscription hears."""
     recorder = record()
     first = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
-    first.publish(pose(START_NS))
+    first.publish(runs.pose(START_NS))
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 1, what='the first pose')
     for k in range(1, 200):
-        first.publish(pose(START_NS + k))
+        first.publish(runs.pose(START_NS + k))
     weak = cell.create_publisher(PoseStamped, 'atomizer/pose', BEST_EFFORT)
     until_s = time.monotonic() + 30.0
     while weak.get_subscription_count() == 0 and time.monotonic() < until_s:
         recorder.recorded['/atomizer/pose'].match_qos()
     for k in range(200, 300):
-        first.publish(pose(START_NS + k))
+        first.publish(runs.pose(START_NS + k))
     wait_until(lambda: recorder.run.counts['/atomizer/pose'] == 300, what='all poses')
     # Those that are in the queue at the end are recorded, too.
     for k in range(300, 800):
-        first.publish(pose(START_NS + k))
+        first.publish(runs.pose(START_NS + k))
     first.wait_for_all_acked()
     recorder.close()
-    stamps = [header_stamp_ns(cdr) for t, cdr in messages(recorder.run.folder) if 'pose' in t]
+    stamps = [header_stamp_ns(cdr) for cdr in runs.recorded(recorder.run.folder)]
     assert stamps == [START_NS + k for k in range(800)]
 
 
@@ -113,12 +111,12 @@ def test_named_topics_are_recorded_and_no_others(record, publisher, wait_until, 
     chatter = publisher(String, 'chatter', topics.RESULTS)
     gun = publisher(Bool, '/cell/gun', topics.RESULTS)
     other = cell.create_publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
-    other.publish(pose(START_NS))
+    other.publish(runs.pose(START_NS))
     chatter.publish(String(data='hello'))
     gun.publish(Bool(data=True))
     wait_until(lambda: recorder.run.message_count == 2, what='both messages')
-    information = finish(recorder)
-    assert counts(information) == {'/chatter': 1, '/cell/gun': 1}
+    information = runs.finish(recorder)
+    assert runs.counts(information) == {'/chatter': 1, '/cell/gun': 1}
     notes = information['custom_data']
     assert notes['mesh_file'] == str(mesh)
     assert len(notes['mesh_sha256']) == 64
@@ -155,10 +153,8 @@ def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
     until_ns = time.time_ns() + (5_000_000_000 if are_lost else 300_000_000)
     at = header('part', START_NS + 9)
     carried = [state_message('', TriggerChange(START_NS + 5, 0.5))]
-    parts.publish(Part(
-        run='1', header=at, last_sent_ns=until_ns, guns=[''],
-        states_sent_ns=[until_ns], states=carried,
-    ))  # fmt: skip
+    sent = {'last_sent_ns': until_ns, 'states_sent_ns': [until_ns]}
+    parts.publish(Part(run='1', header=at, guns=[''], states=carried, **sent))
     wait_until(lambda: recorder.run.folder.name == '1', what='the run')
     if are_lost:
         still(3.0)
@@ -188,16 +184,16 @@ def test_gaps_and_missed_messages_are_reported(record, publisher, onlooker, wait
     poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
     stamps_ns = START_NS + np.array([0, 4, 8, 508, 512, 612, 613]) * 1_000_000
     for stamp in stamps_ns.tolist():
-        poses.publish(pose(stamp))
+        poses.publish(runs.pose(stamp))
 
-    losses = '0 missed' if NUMBERED else 'losses cannot be counted'
+    losses = '0 missed' if runs.NUMBERED else 'losses cannot be counted'
     task = 'run_recorder: recording'
     # 500 ms is a gap, 100 ms is just none.
     told = f'7 messages, {losses}, 1 gaps'
     wait_until(lambda: viewer.value(task, '/atomizer/pose') == told, what='the diagnostics')
     assert all(int(viewer.value(task, key)) > 0 for key in ('bytes', 'disk free bytes'))
     recorder.close()
-    words = f'7 messages{"" if NUMBERED else UNCOUNTED}, 1 gaps'
+    words = f'7 messages{"" if runs.NUMBERED else runs.UNCOUNTED}, 1 gaps'
     assert recorder.summary() == f'{words}, file complete: {recorder.run.folder}'
 
 
@@ -215,11 +211,11 @@ def test_a_queue_that_overflows_shows_as_missed(record, cell, publisher, wait_un
     recorder.close()
     lost = 301 - recorder.run.message_count
     assert lost > 0
-    missed = f', {lost} missed' if NUMBERED else UNCOUNTED
+    missed = f', {lost} missed' if runs.NUMBERED else runs.UNCOUNTED
     assert f'{recorder.run.message_count} messages{missed}' in recorder.summary()
 
 
-@pytest.mark.skipif(not NUMBERED, reason='this middleware does not number messages')
+@pytest.mark.skipif(not runs.NUMBERED, reason='this middleware does not number messages')
 def test_what_is_sent_before_its_publisher_is_heard_is_counted(record, cell, wait_until):
     """Of one robot that starts after the recorder, and of one that has long been sending."""
     sent = Counter()
@@ -229,7 +225,7 @@ def test_what_is_sent_before_its_publisher_is_heard_is_counted(record, cell, wai
         robot = cell.create_publisher(PoseStamped, f'{gun}/atomizer/pose', best_effort)
 
         def send() -> None:
-            robot.publish(pose(START_NS + sent[gun]))
+            robot.publish(runs.pose(START_NS + sent[gun]))
             sent[gun] += 1
 
         cell.create_timer(0.005, send)
@@ -270,7 +266,7 @@ def test_a_killed_recorder_keeps_what_came_before(ros_domain, publisher, wait_un
     with recorder_process(tmp_path, topics='[/pose]') as process:
         poses = publisher(PoseStamped, '/pose', QoSProfile(depth=100))
         for number in range(100):
-            poses.publish(pose(START_NS + number * 4_000_000))
+            poses.publish(runs.pose(START_NS + number * 4_000_000))
 
         def on_disk() -> int:
             # One chunk of poses that came within half a second, or several.

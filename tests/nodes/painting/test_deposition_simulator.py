@@ -1,14 +1,12 @@
 """The live film over real DDS."""
 
 import time
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import trimesh
-from scipy.spatial.transform import Rotation
 
-from nodes.cell import offline_um, two_passes
+from nodes.cell import offline_um, turned, two_passes
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
@@ -55,12 +53,7 @@ def test_the_gun_decides_which_side_of_a_solid_is_outward(simulator, robot, pain
     write_model(tmp_path / 'air.yaml', model)
     plate = tmp_path / 'plate.stl'
     trimesh.creation.box((0.012, 0.8, 0.8)).export(plate)
-    quarter = Rotation.from_euler('z', 90.0, degrees=True)
-    motion = replace(
-        MOTION,
-        positions_m=quarter.apply(MOTION.positions_m),
-        quaternions_xyzw=(quarter * Rotation.from_quat(MOTION.quaternions_xyzw)).as_quat(),
-    )
+    motion = turned(MOTION, 90.0)
     still = simulator(mesh_file=str(plate))
     node = simulator(mesh_file=str(plate), model_file=str(tmp_path / 'air.yaml'))
     robot(still, node).send(motion)

@@ -152,9 +152,6 @@ def test_meshes_are_read_once_for_each_shape_they_have(simulator, change, wider,
     def ready() -> str:
         return node.parts.status().values['meshes prepared']
 
-    def width_m() -> float:
-        return np.ptp(node.points.positions_m[:, 0])
-
     assert ready() == third
     for serial, mesh, kept in (
         ('1', third, [first]), ('2', wider, [first, third]), ('3', first, [third, wider]),
@@ -165,11 +162,11 @@ def test_meshes_are_read_once_for_each_shape_they_have(simulator, change, wider,
     narrow = Path(first).read_bytes()
     shutil.copy(wider, first)
     assert change(serial='4').success
-    assert width_m() == pytest.approx(1.3 * PANEL_M)
+    assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(1.3 * PANEL_M)
     Path(first).write_bytes(narrow)
     assert change(serial='5', mesh_file=wider).success
     assert change(serial='6', mesh_file=first).success
-    assert width_m() == pytest.approx(PANEL_M)
+    assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(PANEL_M)
 
 
 def test_a_further_coat_lies_on_the_first(simulated, painted, change, tmp_path):
@@ -279,10 +276,7 @@ def test_a_change_that_fails_is_none(simulated, painted, asked, wait_until, tmp_
 def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
     simulator, robot, painted, change, asked, record, wider, wait_until, tmp_path
 ):
-    """Two states are sent early, and half the poses before the part is announced.
-
-    The robot's clock is ahead, and the part between has no poses.
-    """
+    """Two states are sent early, the robot's clock is ahead, the part between has no poses."""
     ahead_ns = time.time_ns() + 60 * LATER_NS - WITHOUT_TRIGGER.stamps_ns[0]
     moved = replace(WITHOUT_TRIGGER, stamps_ns=WITHOUT_TRIGGER.stamps_ns + ahead_ns)
     node = simulator(max_edge_length_m=0.015, part_parent_frame='cell')
@@ -332,9 +326,8 @@ def test_poses_that_wait_are_of_their_part(simulator, robot, painted, asked, wai
     """The change waits for them; without a transform they are refused on their own part."""
     node = simulator()
     # A cell in which transforms may come.
-    node.frame.tf_topics.append(
-        AdaptiveSubscription(node, PoseStamped, 'tf_of_another_kind', print, depth=1)
-    )
+    transforms = AdaptiveSubscription(node, PoseStamped, 'tf_of_another_kind', print, depth=1)
+    node.frame.tf_topics.append(transforms)
     source = robot(node)
     source.send(MOTION, frame_id='cell')
     wait_until(lambda: len(node.inputs[0].tf_queue) == len(MOTION), what='poses that wait')

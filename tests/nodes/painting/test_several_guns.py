@@ -5,25 +5,15 @@ from functools import partial
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
-from nodes.cell import Robot, offline_um, two_passes
+from nodes.cell import Robot, offline_um, turned, two_passes
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.files.motion_files import MotionSource, read_gun_motions
 
 
 def moved(motion: pd.Trajectory, by_m: list[float]) -> pd.Trajectory:
     return replace(motion, positions_m=motion.positions_m + by_m)
-
-
-def from_behind(motion: pd.Trajectory) -> pd.Trajectory:
-    """The motion turned by half a turn about the vertical z."""
-    half_turn = Rotation.from_euler('z', np.pi)
-    turned = half_turn * Rotation.from_quat(motion.quaternions_xyzw)
-    return replace(
-        motion, positions_m=half_turn.apply(motion.positions_m), quaternions_xyzw=turned.as_quat()
-    )
 
 
 GUNS = ['robot_1', 'robot_2']
@@ -77,7 +67,7 @@ def test_the_first_gun_decides_which_side_is_outward(simulator, guns, painted, w
     """Two guns on the two sides of a sheet; the one behind it comes first."""
     node = simulator(atomizers=GUNS)
     first, second = guns(node)
-    behind = from_behind(LOW)
+    behind = turned(LOW, 180.0)
     second.send(behind)
     painted(node, len(behind))
     wait_until(lambda: node.surface.outward[1] > 0.0, what='the part turned to the second gun')
@@ -103,9 +93,7 @@ def test_what_does_not_go_together_is_refused(simulator, tmp_path):
             simulator(**{'atomizers': GUNS} | values)
 
 
-def test_the_film_is_the_sum_of_the_guns_whoever_comes_first_and_that_of_their_run_replayed(
-    simulator, record, guns, wait_until, painted, play, tmp_path
-):
+def test_the_film_is_the_sum_of_guns(simulator, record, guns, wait_until, painted, play, tmp_path):
     """In turn, one after the other, from one bag by a player for each gun, and offline."""
     pd.write_model(tmp_path / 'thin.yaml', THIN)
     low = moved(two_passes(poses=320), [0.1, 0.0, -0.15])

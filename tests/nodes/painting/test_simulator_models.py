@@ -36,12 +36,6 @@ def set_model(tmp_path):
     return set_model
 
 
-@pytest.fixture
-def node(simulator, tmp_path):
-    pd.write_model(tmp_path / 'brushes.yaml', BRUSHES)
-    return simulator(model_file=str(tmp_path / 'brushes.yaml'))
-
-
 def test_a_new_model_paints_the_motion_so_far_again(simulated, painted, wait_until, set_model):
     node, source = simulated()
     source.send(MOTION, slice(0, 300))
@@ -144,9 +138,10 @@ def test_a_new_model_may_also_paint_from_then_on_only(simulated, painted, wait_u
     assert np.abs(painted(node) - expected).max() < 0.05 * whole.max()
 
 
-def test_a_brush_that_the_model_lacks_is_refused(node, robot, painted, onlooker, wait_until):
+def test_a_brush_of_no_model_is_refused(simulated, painted, onlooker, wait_until, tmp_path):
     """The paint of such a state is not painted, nor any before a state names a brush."""
-    viewer, source = onlooker(), robot(node)
+    pd.write_model(tmp_path / 'brushes.yaml', BRUSHES)
+    (node, source), viewer = simulated(model_file=str(tmp_path / 'brushes.yaml')), onlooker()
     source.send(two_passes(trigger=False))
     assert painted(node).max() == 0.0
     wait_until(lambda: viewer.reports(POSES, 'no state names one of the brushes yet'))

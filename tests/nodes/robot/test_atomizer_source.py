@@ -101,10 +101,9 @@ def test_a_driver_that_returns_another_way_is_heard(source, ros_context, spin, w
         driver.destroy_node()
 
 
-@pytest.mark.parametrize(
-    ('given', 'prefix', 'scale'),
-    [({}, '', 1.0), ({'joint_prefix': 'irb_', 'angle_unit': 'deg'}, 'irb_', 180.0 / np.pi)],
-)
+@pytest.mark.parametrize(('given', 'prefix', 'scale'), [
+    ({}, '', 1.0), ({'joint_prefix': 'irb_', 'angle_unit': 'deg'}, 'irb_', 180.0 / np.pi),
+])  # fmt: skip
 def test_poses_are_those_of_the_bell(source, driver, viewer, wait_until, given, prefix, scale):
     offset = [0.0, 0.02, 0.15, 0.0, np.sin(0.2), 0.0, np.cos(0.2)]
     source(tcp_offset=offset, **given)

@@ -155,10 +155,10 @@ def test_signals_of_a_controller_switch_the_gun(start, states, wait_until):
         assert np.isnan(opened.voltage_kv)
         assert 0.05e9 <= time.time_ns() - stamp_ns(opened.header) < 60e9
         wait_until(lambda: states.reports('rws_source: signals', 'following the signals'))
-        controller.socket.close()
+        broken = controller.socket
+        broken.close()
         wait_until(lambda: states.reports('rws_source: signals', url, b'\x02'), what='the break')
-        controller.socket = None
-        wait_until(lambda: controller.socket is not None, what='another connection')
+        wait_until(lambda: controller.socket is not broken, what='another connection')
         assert controller.sessions == 1
         node.close()
         wait_until(lambda: controller.sessions == 0, what='the end of the session')
