@@ -144,11 +144,9 @@ def test_inspect_says_and_draws_how_the_gun_ran_over_the_door(tmp_path):
     assert (figures['mesh_file'], figures['picture']) == (str(door), None)
 
 
-@pytest.mark.parametrize(
-    ('mesh', 'bag'),
-    [('door.stl', 'door_vertical'), ('measured_door/door.stl', 'measured_door/door')],
-)
-def test_the_samples_are_not_warned_of(mesh, bag):
+@pytest.mark.parametrize('bag', ['door_vertical', 'measured_door/door'])
+def test_the_samples_are_not_warned_of(bag):
+    mesh = 'measured_door/door.stl' if bag == 'measured_door/door' else 'door.stl'
     recorded = pd.read_recording(SAMPLES / bag, state_topic='/atomizer/state')
     found = pd.look_at(pd.read_mesh(SAMPLES / mesh, max_edge_length_m=0.1), recorded).geometry
     assert (recorded.warnings, found.warnings) == ((), ())

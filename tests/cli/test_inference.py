@@ -112,10 +112,7 @@ def test_the_page_of_the_demo_needs_nothing_else_and_opens_once(demo):
 
 @pytest.mark.slow
 def test_the_guide_comes_to_a_painted_door(repository, tmp_path, demo, undrawn):
-    """Commands of docs/first_cell.md but those of nodes, on a copy of the samples.
-
-    They print the figures it names. The demo has diagnosed the same campaign.
-    """
+    """Commands of docs/first_cell.md but those of nodes print its figures on a copy of samples."""
     page = (repository / 'docs/first_cell.md').read_text(encoding='utf-8')
     folder = shutil.copytree(SAMPLES, tmp_path / 'first_cell')
     shutil.copytree(demo[1] / 'diagnosis', folder / 'diagnosis')

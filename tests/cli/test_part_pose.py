@@ -62,16 +62,15 @@ def test_poses_of_another_frame_are_warned_of_with_both_names(tmp_path):
     assert brought_to_the_part(bag, frame_id='cell').warnings == ()
 
 
-@pytest.mark.parametrize(('options', 'words'), [
-    ({'frame_id': 'door'}, ["'base_link'", "'door'", '--part-pose']),
-    ({'frame_id': 'base_link', 'part_pose': PART_POSE},
-     ["'base_link'", 'part_pose', 'leave one of them out']),
-])  # fmt: skip
-def test_a_named_frame_that_nothing_leads_to_is_refused(options, words, tmp_path):
+def test_a_named_frame_that_nothing_leads_to_is_refused(tmp_path):
     bag = write_pose_bag(tmp_path / 'run', seen_from_the_robot())
-    with pytest.raises(pd.PaintError) as refused:
-        pd.read_recording(bag, **options)
-    assert all(word in str(refused.value) for word in words)
+    for options, words in (
+        ({'frame_id': 'door'}, "'base_link'.*'door'.*--part-pose"),
+        ({'frame_id': 'base_link', 'part_pose': PART_POSE},
+         "'base_link'.*part_pose.*leave one of them out"),
+    ):  # fmt: skip
+        with pytest.raises(pd.PaintError, match=words):
+            pd.read_recording(bag, **options)
 
 
 @pytest.mark.parametrize('storage', ['mcap', 'ros1'])

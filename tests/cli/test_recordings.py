@@ -13,16 +13,6 @@ from paint_deposition.files.provenance import sha256
 from paint_deposition.files.recordings.bags import write_pose_bag
 
 
-@pytest.fixture
-def cut_run(tmp_path):
-    folder = write_pose_bag(tmp_path / 'run', straight_pass(4_000))
-    path = folder / 'run_0.mcap'
-    content = path.read_bytes()
-    path.write_bytes(content[: int(0.7 * len(content))])
-    (folder / 'metadata.yaml').unlink()
-    return folder
-
-
 @pytest.mark.slow
 def test_inspect_a_real_bag(shared_data):
     done = ran('inspect', shared_data / 'bags/evo_ROS_example.bag')
@@ -30,9 +20,15 @@ def test_inspect_a_real_bag(shared_data):
     line = next(line for line in done.stdout.splitlines() if line.startswith('poses on groundtr'))
     assert "12765 in frame 'groundtruth' over 889.019 s" in line
     assert '95 gaps, longest interval 2.041 s' in line
+    done = ran('inspect', shared_data / 'bags/evo_nav2_turtlebot.mcap')
+    assert 'transforms: --tf TARGET SOURCE takes the motion from them' in done.stdout
 
 
-def test_recover_does_what_inspect_says_of_an_unfinished_run(cut_run, tmp_path):
+def test_recover_does_what_inspect_says_of_an_unfinished_run(tmp_path):
+    cut_run = write_pose_bag(tmp_path / 'run', straight_pass(4_000))
+    content = (cut_run / 'run_0.mcap').read_bytes()
+    (cut_run / 'run_0.mcap').write_bytes(content[: int(0.7 * len(content))])
+    (cut_run / 'metadata.yaml').unlink()
     done = paint('inspect', cut_run)
     assert_refused(done)
     assert done.stderr.endswith(f'run: paint recover {cut_run}\n')
@@ -121,11 +117,6 @@ def test_a_mesh_says_its_size_and_unit(panel, tmp_path):
     assert (figures['mesh_scale'], figures['high_m'][0]) == (0.001, pytest.approx(0.6))
     assert 'read with --mesh-scale 0.001' in ran('inspect', part, *given).stdout
     assert_refused(paint('inspect', part, '--body', 'lid'), "no body 'lid'")
-
-
-def test_a_bag_without_poses_says_where_its_motion_is(shared_data):
-    done = paint('inspect', shared_data / 'bags' / 'evo_nav2_turtlebot.mcap')
-    assert 'transforms: --tf TARGET SOURCE takes the motion from them' in done.stdout
 
 
 def test_inspect_a_real_program(shared_data):

@@ -99,10 +99,7 @@ def test_what_a_marker_names_is_no_leave_for_a_folder_or_a_link(tmp_path, name):
 
 
 def end_at_a_call(folder, end: str, call: int) -> None:
-    """Write results, and be killed at this call of those that change the folder, or fail there.
-
-    Exits with 3 if there are fewer calls.
-    """
+    """Write results; end at this call of those that change the folder, or with code 3."""
     left = [call]
 
     def counted(function):

@@ -56,10 +56,7 @@ def test_the_door_is_painted_and_figures_say_how(tmp_path):
 
 
 def test_predictions_are_exact_at_the_readings(panel, one_pass, tmp_path):
-    """On a flat panel against eqs. (1) and (2) summed in NumPy; other columns are kept.
-
-    What acts on the gauge is in the predictions and not in the film.
-    """
+    """Eqs. (1) and (2) summed in NumPy, and the gauge, which is not in the film."""
     rng = np.random.default_rng(8)
     x, z = np.round([rng.uniform(-0.5, 0.5, 12), rng.uniform(-0.3, 0.3, 12)], 6)
     x[1], z[1] = x[0], z[0]  # a repeat

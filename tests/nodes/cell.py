@@ -182,9 +182,7 @@ class Robot(Node):
         )
 
     def hearers(self) -> tuple[int, int]:
-        """How many listen to poses and to states as reliably as they are sent: in this process,
-        and in others.
-        """
+        """How many listen as reliably as it sends, in this process and in others."""
         counts = []
         for publisher in (self.pose_publisher, self.state_publisher):
             topic = publisher.topic_name

@@ -56,10 +56,8 @@ def record(start, tmp_path):
     """`record(**parameters)`: a recorder of the run `run`, running."""
     from paint_deposition.nodes.bags.run_recorder import RunRecorder
 
-    def record(**chosen) -> RunRecorder:
-        return start(RunRecorder, **{'output_directory': str(tmp_path), 'name': 'run'} | chosen)
-
-    return record
+    run = {'output_directory': str(tmp_path), 'name': 'run'}
+    return lambda **chosen: start(RunRecorder, **run | chosen)
 
 
 @pytest.fixture
@@ -138,10 +136,7 @@ def call(wait_until):
 
 @pytest.fixture
 def painted(wait_until):
-    """`painted(node, count)`: wait until so many poses were painted; the film in micrometres.
-
-    By default all poses of `two_passes()`.
-    """
+    """`painted(node, count)`: the film [um] once so many poses, or `two_passes()`, are painted."""
     from nodes.cell import TWO_PASSES_POSES
 
     def painted(node, count: int = TWO_PASSES_POSES) -> np.ndarray:

@@ -22,10 +22,7 @@ def simulator_process(folder: Path, **parameters: object) -> 'NodeProcess':
 
 
 class NodeProcess:
-    """An executable in a new process; `parameters` go on its command line.
-
-    Output goes to `<log>.out` and `<log>.err`. Use as a context manager: it is killed at the end.
-    """
+    """An executable that writes `<log>.out` and `<log>.err`, and is killed when a `with` ends."""
 
     def __init__(
         self,

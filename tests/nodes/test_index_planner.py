@@ -89,10 +89,7 @@ def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path)
 
 @pytest.fixture
 def pursue(onlooker, wait_until):
-    """`pursue(cancel_at='', **goal)`: the status, the result and the feedback.
-
-    A goal that is cancelled at a stage must end within two seconds.
-    """
+    """`pursue(cancel_at='', **goal)`: status, result, feedback; cancelled it ends within 2 s."""
     user = onlooker()
 
     def pursue(cancel_at='', **goal):

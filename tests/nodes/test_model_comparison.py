@@ -86,10 +86,7 @@ def test_the_error_falls_to_the_noise_while_painting(comparison, robot, viewer, 
 
 
 def test_a_better_model_lowers_the_error(comparison, robot, viewer, call, wait_until, truth):
-    """Predictions are those of an offline run in double precision, and a service says it.
-
-    The surface is coloured around readings and grey elsewhere.
-    """
+    """Predictions are those of an offline run; a service and colours around readings say it."""
     node = comparison(color_max_um=5.0)
     robot(node).send(MOTION)
     wait_until(lambda: node.film.counts.received == len(MOTION))

@@ -86,15 +86,15 @@ MOTION = two_passes()
 
 
 @pytest.fixture
-def nodes(tmp_path):
-    """How each kind of node is made that subscribes to anything."""
+def made(closed, tmp_path):
+    """`made(name)`: a node that runs, of each kind that subscribes to anything."""
     mesh = {'mesh_file': str(write_panel(tmp_path / 'panel.stl')), 'max_edge_length_m': 0.1}
     readings = tmp_path / 'readings.csv'
     readings.write_text('x_m,y_m,z_m,thickness_um\n' + '0.0,0.0,0.1,20\n0.1,0.0,0.1,21\n' * 3)
     bag = str(write_pose_bag(tmp_path / 'pass', MOTION))
     signal = {'trigger': 'gun', 'flow': 'flow'}
     films = {'output_directory': str(tmp_path / 'films')}
-    return {
+    nodes = {
         'simulator': (DepositionSimulator, mesh | films),
         'comparison': (ModelComparison, mesh | {'measurements_file': str(readings)}),
         'web_view': (WebView, mesh | {'port': 0}),
@@ -104,11 +104,6 @@ def nodes(tmp_path):
         'trigger': (AtomizerSource, signal),
         'player': (BagPlayer, {'bag': bag, 'rate': 0.0, 'loop': True, 'publish_clock': False}),
     }
-
-
-@pytest.fixture
-def made(nodes, closed):
-    """`made(name)`: that node, running."""
     return lambda name: closed(nodes[name][0], **nodes[name][1])
 
 

@@ -14,15 +14,9 @@ import time
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
-from hypothesis import HealthCheck, Phase, seed, settings
+from hypothesis import HealthCheck, Phase, seed, settings, stateful
 from hypothesis import strategies as st
-from hypothesis.stateful import (
-    initialize,
-    invariant,
-    precondition,
-    rule,
-    run_state_machine_as_test,
-)
+from hypothesis.stateful import initialize, invariant, precondition, rule
 from paint_msgs.msg import AtomizerState
 from paint_msgs.srv import ChangePart
 from rcl_interfaces.srv import SetParameters
@@ -294,4 +288,5 @@ def test_every_run_has_the_film_that_was_seen(ros_context, executor, wait_until,
         derandomize=STEPS <= 1000 and SEED is None, database=None, print_blob=True,
     )  # fmt: skip
     factory = lambda: Cell(ros_context, executor, wait_until, tmp_path)  # noqa: E731
-    run_state_machine_as_test(factory if SEED is None else seed(int(SEED))(factory), settings=many)
+    factory = factory if SEED is None else seed(int(SEED))(factory)
+    stateful.run_state_machine_as_test(factory, settings=many)

@@ -26,11 +26,6 @@ SET_PARAMETERS = '/deposition_simulator/set_parameters'
 HAS_TF = importlib.util.find_spec('tf2_msgs') is not None
 
 
-def in_the_cell() -> pd.Trajectory:
-    poses = Rigid.of(PART_POSE).applied(PASSES.positions_m, PASSES.quaternions_xyzw)
-    return pd.Trajectory(PASSES.stamps_ns, *poses, 'base_link')
-
-
 @pytest.fixture
 def recorded(simulator, record, robot, painted, wait_until):
     """A run of poses in `base_link`, and the film that the simulator had of it."""
@@ -40,7 +35,8 @@ def recorded(simulator, record, robot, painted, wait_until):
     source = robot(node)
     # The recorder subscribes once it has found the publisher.
     wait_until(lambda: source.has_subscribers(2))
-    source.send(in_the_cell(), frame_id='base_link')
+    poses = Rigid.of(PART_POSE).applied(PASSES.positions_m, PASSES.quaternions_xyzw)
+    source.send(pd.Trajectory(PASSES.stamps_ns, *poses, 'base_link'), frame_id='base_link')
     film = painted(node, len(PASSES))
     wait_until(lambda: recorder.run.counts['/atomizer/pose'] == len(PASSES), what='all recorded')
     recorder.close()

@@ -136,12 +136,7 @@ def test_bad_input_is_reported_at_the_start(record):
 def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
     record, ros_context, spin, onlooker, wait_until, still, tmp_path, monkeypatch, are_lost
 ):
-    """One comes before its part is announced, others after the next part is.
-
-    They count that are in the queue of a recorder which was stopped for longer than it waits, and
-    those that were lost on the way and come with the next heartbeat, three seconds later. The run
-    ends once it has what was sent for it.
-    """
+    """One comes before its part, others from a full queue or with the heartbeat 3 s later."""
     if not are_lost:
         monkeypatch.setattr(run_recorder, 'LATE_S', 2.0)
     recorder, robot, place = record(), Robot(ros_context), (np.zeros(3), FACING_PANEL)

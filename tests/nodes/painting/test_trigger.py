@@ -34,12 +34,8 @@ def test_a_state_of_which_only_spraying_is_filled_sprays(simulated, painted, onl
     wait_until(lambda: viewer.reports(POSES, '1 states that spray with flow 0', b'\x01'))
 
 
-def test_a_latched_trigger_counts(simulator, ros_context, spin, wait_until, painted, capfd):
-    """The gun was closed before the node was there, and stays closed: no paint.
-
-    It is heard beside a robot that sends by best effort and keeps nothing, which is heard as well:
-    neither side reports that the other does not fit.
-    """
+def test_a_latched_trigger_counts(simulator, ros_context, spin, wait_until, painted):
+    """The gun was closed before; beside it a robot sends by best effort and keeps nothing."""
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     gun = Node('gun', context=ros_context)
     states = gun.create_publisher(AtomizerState, 'atomizer/state', latched)
@@ -50,15 +46,12 @@ def test_a_latched_trigger_counts(simulator, ros_context, spin, wait_until, pain
     node = simulator()
     wait_until(lambda: source.has_subscribers(1), what='discovery')
     wait_until(lambda: node.film.guns[0].flow == 0.0, what='the latched state')
-    said = capfd.readouterr().err
-    assert 'ready' in said
-    assert not {'[WARN]', '[ERROR]'} & set(said.split())
     for count in range(1, 61):  # one by one, or the middleware may drop some
         source.send(UNTRIGGERED, slice(99 + count, 100 + count))
         film = painted(node, count)
     assert film.max() == 0.0
     for publisher, flow in ((states, 0.5), (source.state_publisher, 0.25)):
-        at = header('', int(UNTRIGGERED.stamps_ns[-1]))
+        at = header('', int(UNTRIGGERED.stamps_ns[159]))
         publisher.publish(AtomizerState(header=at, spraying=True, flow=flow))
         wait_until(lambda flow=flow: node.film.guns[0].flow == flow, what='the next state')
 
@@ -109,6 +102,18 @@ def test_robots_are_heard_as_they_send(simulator, ros_context, spin, painted, wa
     assert 310 < row < 599
     wait_until(lambda: node.film.counts.received == 600, what='all poses')
     assert node.film.counts.rejected == node.inputs[0].messages_lost == 0
+
+
+def test_no_more_is_asked_for(simulator, ros_context, spin, onlooker, wait_until, capfd):
+    """Of a best-effort robot that is there: neither side reports that the other does not fit."""
+    source = Robot(ros_context, reliable=False)
+    spin(source)
+    node, viewer = simulator(), onlooker()
+    wait_until(lambda: source.is_subscribed_by(node))
+    wait_until(lambda: viewer.reports(POSES, 'waiting for poses', b'\x00'))
+    said = capfd.readouterr().err
+    assert 'ready' in said
+    assert not {'[WARN]', '[ERROR]'} & set(said.split())
 
 
 def test_a_bool_as_the_state_is_an_error(simulator, onlooker, ros_domain, wait_until):

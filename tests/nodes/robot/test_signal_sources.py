@@ -6,6 +6,7 @@ import time
 from contextlib import contextmanager
 from datetime import datetime, timedelta, timezone
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from urllib.parse import parse_qs
 
 import numpy as np
@@ -108,14 +109,14 @@ class OneUser:
 
 
 @contextmanager
-def supply(address: str, secured: dict | None = None):
-    """A server of asyncua with the gun's variables below Objects, by their names."""
+def supply(address: str, *secured: Path):
+    """A server with the gun's variables below Objects, secured by a certificate and a key."""
     server = Server()
     if secured:
         server.aio_obj.iserver.user_manager = OneUser()
         server.set_security_policy([ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt])
-        server.load_certificate(str(secured['certificate']))
-        server.load_private_key(str(secured['private_key']))
+        server.load_certificate(str(secured[0]))
+        server.load_private_key(str(secured[1]))
     server.set_endpoint(address)
     space = server.register_namespace('urn:supply')
     gun = server.nodes.objects.add_object(space, 'Gun')
@@ -175,24 +176,22 @@ def test_the_cookie_of_a_controller_goes_to_no_other_host(start, states, wait_un
 
 def test_a_supply_may_want_a_user_and_encryption(start, states, wait_until, tmp_path, monkeypatch):
     """The password is in no parameter and in no diagnostics."""
-    files = {
-        'certificate': tmp_path / 'certificate.der', 'private_key': tmp_path / 'private_key.pem',
-    }  # fmt: skip
+    certificate, private_key = tmp_path / 'certificate.der', tmp_path / 'private_key.pem'
     key = generate_private_key()
     pem = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-    files['private_key'].write_bytes(pem)
+    private_key.write_bytes(pem)
     names, host = {'commonName': 'cell'}, socket.gethostname()
     made = generate_self_signed_app_certificate(
         key, 'urn:cell', names, [x509.DNSName(host)], [ExtendedKeyUsageOID.CLIENT_AUTH]
     )
-    files['certificate'].write_bytes(made.public_bytes(Encoding.DER))
+    certificate.write_bytes(made.public_bytes(Encoding.DER))
     monkeypatch.setenv('OPCUA_PASSWORD', 'secret')
     address = f'opc.tcp://127.0.0.1:{free_port(socket.SOCK_STREAM)}'
-    with supply(address, files):
+    with supply(address, certificate, private_key):
         node = start(
             OpcuaSource, url=address, trigger='ns=2;s=Gun.Open', user='cell',
-            security_policy='Basic256Sha256', certificate_file=str(files['certificate']),
-            private_key_file=str(files['private_key']),
+            security_policy='Basic256Sha256', certificate_file=str(certificate),
+            private_key_file=str(private_key),
         )  # fmt: skip
         wait_until(lambda: len(states.heard['atomizer/state']) == 1, what='the first state')
         assert 'secret' not in str(node.values)
