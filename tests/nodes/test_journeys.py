@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 import paint_deposition
-from cli.command import ran
+from cli.command import COARSE, ran
 from nodes.cell import two_passes
 
 PACKAGE = Path(paint_deposition.__file__).parent
 SAMPLES = PACKAGE.parent / 'samples'
-DOOR = ('--mesh', SAMPLES / 'door.stl', '--trajectory', SAMPLES / 'door_horizontal')
+DOOR = ('--mesh', SAMPLES / 'door.stl', '--trajectory', SAMPLES / 'door_horizontal', *COARSE)
 STUDY = SAMPLES / 'panel_study/campaign.yaml'
 
 
@@ -56,6 +56,7 @@ def assert_passes(files: list[str], entered: dict[str, None]) -> None:
     assert [file for file in entered if file in files] == files
 
 
+@pytest.mark.usefixtures('undrawn')
 @pytest.mark.parametrize('words', [('simulate', *DOOR), ('improve', *DOOR), ('diagnose', STUDY)])
 def test_a_command_passes_the_files_of_its_journey(words, entered, repository, tmp_path):
     ran(*words, '-o', tmp_path / 'results')

@@ -146,8 +146,9 @@ def test_meshes_are_read_once_for_each_shape_they_have(simulator, change, wider,
     """Read ahead, or of a part that has left; one that was exported anew is read again."""
     node = simulator()
     first, third = node.mesh_file, str(write_panel(tmp_path / 'third.stl', reverse=True))
-    assert 'third.stl is prepared: Surface(' in change(mesh_file=third, prepare=True).message
-    assert node.mesh_file == first
+    prepared = change(mesh_file=third, prepare=True)
+    assert (prepared.success, node.mesh_file) == (True, first)
+    assert 'third.stl is prepared: Surface(' in prepared.message
 
     def ready() -> str:
         return node.parts.status().values['meshes prepared']
