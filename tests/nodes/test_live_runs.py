@@ -43,7 +43,7 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
         recorder_process(tmp_path) as recorder,
         simulator_process(tmp_path, output_directory=tmp_path, **COARSE) as simulator,
     ):
-        assert player.wait() == 0, player.err
+        assert player.wait(300.0) == 0, player.err
         wait_until(lambda: statistics.shows(STATS, lambda m: m.poses_received == 300), 'all poses')
         saved = call(SaveFilm, '/deposition_simulator/save_film', name='film')
         assert saved.success, saved.message
