@@ -24,6 +24,16 @@ from surfaces import on_grid
 
 TRIGGER = ('--state-topic', '/atomizer/state')
 COARSE = ('--max-edge-length-m', 0.05)
+# A model of three brushes.
+BRUSHES = """
+brushes:
+  1: {planar: {K1_cm3_per_s: 0.7, r_m: 0.1, sigma1_m: 0.06}, flow_cm3_per_min: 200, solids: 0.4,
+      bell_speed_rpm: 30000, density_g_per_cm3: 1.1}
+  2: {planar: {K1_cm3_per_s: 1.4, r_m: 0.2, sigma1_m: 0.08}, flow_cm3_per_min: 400, solids: 0.4,
+      bell_speed_rpm: 50000, density_g_per_cm3: 1.1}
+  3: {planar: {K1_cm3_per_s: 1.0, r_m: 0.15, sigma1_m: 0.07}, flow_cm3_per_min: 300, solids: 0.4,
+      bell_speed_rpm: 40000, density_g_per_cm3: 1.1}
+"""
 
 
 def checked(done: subprocess.CompletedProcess, words: list[str]) -> subprocess.CompletedProcess:
@@ -54,6 +64,11 @@ def ran(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProc
 def figures_of(*arguments: object, cwd: Path | None = None) -> Any:
     """The figures that `paint` prints as JSON."""
     return json.loads(ran(*arguments, cwd=cwd).stdout)
+
+
+def told_in(path: Path) -> Any:
+    """The figures that a command wrote."""
+    return json.loads(path.read_text())
 
 
 def assert_refused(done: subprocess.CompletedProcess, *words: str) -> None:

@@ -7,6 +7,7 @@ import yaml
 
 from booth import SAMPLES
 from cli.command import COARSE, assert_refused, paint
+from cli.command import ran as succeeded
 
 PANEL = SAMPLES / 'panel.stl'
 RAPID = """! planned with a model, sha256 {0}
@@ -50,8 +51,8 @@ def campaign(folder):
         'state_topic': '/atomizer/state',
         'measurements': str(SAMPLES / 'panel_study/panel_577.csv'),
     }  # fmt: skip
-    content = {'experiments': [entry], 'model': 'model.yaml'}
-    (folder / 'campaign.yaml').write_text(yaml.safe_dump(content))
+    text = yaml.safe_dump({'experiments': [entry], 'model': 'model.yaml'})
+    (folder / 'campaign.yaml').write_text(text)
     return ('compare', folder / 'campaign.yaml')
 
 
@@ -66,9 +67,8 @@ def sweep(folder):
 def test_code_that_only_data_name_runs_when_it_is_allowed(tmp_path, ran, data):
     words = data(tmp_path)
     more = () if words[0] == 'watch' else ('-o', tmp_path / 'out')
-    done = paint(*words, *more)
-    assert_refused(done, f'{tmp_path}/mine.py is not run, because it is Python code',
-                   '--allow-effects')  # fmt: skip
+    refusal = f'{tmp_path}/mine.py is not run, because it is Python code', '--allow-effects'
+    assert_refused(paint(*words, *more), *refusal)
     assert not ran.exists()
     done = paint(*words, *more, '--allow-effects')
     assert ran.exists()
@@ -90,6 +90,4 @@ def test_a_model_that_is_named_is_leave_for_its_effects(tmp_path, ran):
     # Another model that is named is taken without a look at that of the plan.
     (tmp_path / 'mine.py').write_text('1 / 0')
     (tmp_path / 'bell.yaml').write_text('effects: []\n')
-    done = paint(*module(tmp_path), *COARSE, '--model', tmp_path / 'bell.yaml', '-o',
-                 tmp_path / 'out')  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    succeeded(*module(tmp_path), *COARSE, '--model', tmp_path / 'bell.yaml', '-o', tmp_path / 'o')

@@ -1,24 +1,26 @@
 """`paint demo`, `compare`, `diagnose` and `refit` as a user runs them, on the sample door."""
 
 import html
-import json
 import os
 import re
 import shlex
 import shutil
 import subprocess
+from itertools import product
+from pathlib import Path
 
 import pytest
 import yaml
 
 from booth import SAMPLES
-from cli.command import assert_refused, figures_of, paint, ran, rows_of
+from cli.command import assert_refused, figures_of, paint, ran, rows_of, told_in
 from paint_deposition.cli.results import MARKER
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.verdict import percent
+from paint_deposition.model.eq1_pattern import PATTERN
 
-CAMPAIGN = SAMPLES / 'measured_door/campaign.yaml'
+MEASURED = SAMPLES / 'measured_door'
 HIDDEN = 'incidence_attraction'
 DIAGNOSE = 'paint diagnose measured_door/campaign.yaml -o diagnosis'
 
@@ -40,7 +42,7 @@ def demo(tmp_path_factory):
 def door_alone(tmp_path_factory):
     """The door without its panel, and a model to start from, as a campaign: less to compute."""
     folder = tmp_path_factory.mktemp('door')
-    shutil.copytree(SAMPLES / 'measured_door', folder, dirs_exist_ok=True)
+    shutil.copytree(MEASURED, folder, dirs_exist_ok=True)
     content = yaml.safe_load((folder / 'campaign.yaml').read_text())
     content = {'experiments': content['experiments'][1:], 'model': 'start.yaml'}
     (folder / 'campaign.yaml').write_text(yaml.safe_dump(content))
@@ -52,24 +54,18 @@ def door_alone(tmp_path_factory):
     return folder / 'campaign.yaml'
 
 
-def content(file) -> dict:
-    return json.loads(file.read_text())
-
-
 @pytest.mark.slow
 def test_the_demo_finds_the_hidden_effect(demo):
     printed, folder = demo
-    found = content(folder / 'diagnosis/diagnosis.json')
+    found = told_in(folder / 'diagnosis/diagnosis.json')
     probability = found['classes'][0]['probability']
     assert probability > SURE
     assert f'incidence attraction:            {percent(probability)} probability\n' in printed
     assert found['verdict'] == 'effect_missing'
     assert found['accepted'] == [HIDDEN]
     assert found['rmse_um']['holdout_after'] < found['rmse_um']['holdout_before']
-    # A model with it is expected beside one without: both can be simulated.
-    before, after = (
-        read_model_file(folder / f'diagnosis/{name}.yaml') for name in ('model_before', 'model')
-    )
+    before = read_model_file(folder / 'diagnosis/model_before.yaml')
+    after = read_model_file(folder / 'diagnosis/model.yaml')
     assert before.model.effects == ()
     assert [effect.id for effect in after.model.effects] == found['accepted']
     assert [step['added'] for step in after.history] == ['pattern', *found['accepted']]
@@ -87,12 +83,12 @@ def test_the_page_of_the_demo_has_the_figures_of_the_files(demo):
     shown = {label: (before, after) for label, before, after in shown}
     for label, (before, after) in shown.items():
         assert f'  {label + ":":32} {before + " -> " if before else ""}{after} ' in printed
-    film = content(folder / 'film/stats.json')
+    film = told_in(folder / 'film/stats.json')
     assert shown['Film'] == ('', f'{film["mean_um"]:.1f}')
-    errors = content(folder / 'diagnosis/diagnosis.json')['rmse_um']
-    unseen = [m['rmse_um'] for m in content(folder / 'unseen/comparison.json')['models']]
+    errors = told_in(folder / 'diagnosis/diagnosis.json')['rmse_um']
+    unseen = [m['rmse_um'] for m in told_in(folder / 'unseen/comparison.json')['models']]
     assert unseen[1] < 0.85 * unseen[0]
-    better = content(folder / 'improved/improvement.json')
+    better = told_in(folder / 'improved/improvement.json')
     assert better['sigma_n']['after'] < 0.5 * better['sigma_n']['before']
     for label, before, after in (
         ('Error at fitted points', f'{errors["before"]:.2f}', f'{errors["after"]:.2f}'),
@@ -116,14 +112,11 @@ def test_the_page_of_the_demo_needs_nothing_else_and_opens_once(demo):
 
 @pytest.mark.slow
 def test_the_guide_comes_to_a_painted_door(repository, tmp_path, demo, undrawn):
-    """Commands of docs/first_cell.md but those of nodes, on a copy of the samples.
-
-    They print the figures it names. The demo has diagnosed the same campaign.
-    """
+    """Commands of docs/first_cell.md but those of nodes print its figures on a copy of samples."""
     page = (repository / 'docs/first_cell.md').read_text(encoding='utf-8')
     folder = shutil.copytree(SAMPLES, tmp_path / 'first_cell')
     shutil.copytree(demo[1] / 'diagnosis', folder / 'diagnosis')
-    everything = content(folder / 'diagnosis/diagnosis.json')['reason']
+    everything = told_in(folder / 'diagnosis/diagnosis.json')['reason']
     blocks = re.findall(r'```bash\n(.*?)```', page, re.DOTALL)
     for line in ''.join(block for block in blocks if ' &\n' not in block).splitlines():
         if line.startswith('paint ') and line != DIAGNOSE:
@@ -151,9 +144,7 @@ def test_a_diagnosis_writes_all_that_it_says(demo):
         'report.html', 'comparison.png',
     }  # fmt: skip
     rows = rows_of(folder / 'residuals.csv')
-    readings = rows_of(SAMPLES / 'measured_door/panel.csv') + rows_of(
-        SAMPLES / 'measured_door/door.csv'
-    )
+    readings = [row for part in ('panel', 'door') for row in rows_of(MEASURED / f'{part}.csv')]
     measured = [f'{float(reading["thickness_um"]):.3f}' for reading in readings]
     assert [row['thickness_um'] for row in rows] == measured
     residual = [float(row['thickness_um']) - float(row['predicted_um']) for row in rows]
@@ -163,7 +154,7 @@ def test_a_diagnosis_writes_all_that_it_says(demo):
 @pytest.mark.slow
 def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
     done = ran('compare', door_alone, '-o', tmp_path)
-    content = json.loads((tmp_path / 'comparison.json').read_text())
+    content = told_in(tmp_path / 'comparison.json')
     assert set(content) == {
         'geometry', 'readings', 'noise', 'left_out', 'misfits', 'regions', 'dependences',
         'notes', 'zones', 'provenance',
@@ -199,15 +190,14 @@ def test_a_slip_among_repeats_is_left_out_and_named(door_alone, tmp_path):
     content['experiments'][0]['measurements'] = 'slip.csv'
     content.pop('model')
     (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump(content))
-    for command in (['compare'], ['refit', '--add', 'none']):
-        output = tmp_path / command[0]
+    for name, *command in (('comparison', 'compare'), ('diagnosis', 'refit', '--add', 'none')):
+        output = tmp_path / name
         done = ran(*command, tmp_path / 'campaign.yaml', '-o', output)
         lines = (done.stdout + done.stderr).splitlines()
         (told,) = (line for line in lines if 'left out of the fit' in line)
         note = told.partition(': ')[2]
         assert note.startswith(f"door: point '{labels[slip]}': {float(text) - 11.0:.4g} µm beside")
-        name = 'comparison' if command == ['compare'] else 'diagnosis'
-        assert json.loads((output / f'{name}.json').read_text())['notes'][-1] == note
+        assert told_in(output / f'{name}.json')['notes'][-1] == note
         assert f'point &#39;{labels[slip]}&#39;: ' in (output / 'report.html').read_text()
         residuals = rows_of(output / 'residuals.csv')
         assert [row['point'] for row in residuals] == labels
@@ -234,15 +224,10 @@ def test_refit_adds_an_effect_by_its_id_and_carries_the_history_on(door_alone, t
         assert step['noise_floor_um'] == pytest.approx(errors['noise_floor'], abs=1e-4)
         assert step['campaign'] == str(door_alone)
     before = read_model_file(tmp_path / 'model_before.yaml')
-    assert before.name == model.name
-    assert before.history == model.history[:2]
+    assert (before.name, before.history) == (model.name, model.history[:2])
     report = (tmp_path / 'report.html').read_text()
     assert '<td>+ a wish</td>' in report
     assert str(door_alone) in report
-    again = paint(
-        'refit', door_alone, '--model', tmp_path / 'model.yaml', '--add', HIDDEN, '-o', tmp_path
-    )
-    assert_refused(again, f'{HIDDEN} is in the model already')
 
 
 @pytest.mark.slow
@@ -260,9 +245,9 @@ def test_refit_adds_an_effect_of_ones_own(door_alone, tmp_path):
 def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(door_alone, tmp_path):
     """It is put into the model in place of the law, and compared."""
     file, output = tmp_path / 'my_incidence.py', tmp_path / 'out'
-    done = ran('refit', door_alone, '--add', 'learned:incidence_deg', '--as-effect', file,
-               '-o', output)  # fmt: skip
-    content = json.loads((output / 'diagnosis.json').read_text())
+    learn = ('--add', 'learned:incidence_deg', '--as-effect', file, '-o', output)
+    done = ran('refit', door_alone, *learn)
+    content = told_in(output / 'diagnosis.json')
     best, *_ = content['classes'][0]['forms']
     assert best['formula'] in done.stdout
     model = yaml.safe_load((output / 'model.yaml').read_text())
@@ -270,33 +255,80 @@ def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(door_alon
     own = {key: model[key] for key in ('planar', 'projection')}
     own['effects'] = [{'file': str(file), **values}]
     (tmp_path / 'own.yaml').write_text(yaml.safe_dump(own))
-    done = ran('compare', door_alone, '--model', output / 'model.yaml', '--model',
-               tmp_path / 'own.yaml', '-o', tmp_path / 'both')  # fmt: skip
+    both = ('--model', output / 'model.yaml', '--model', tmp_path / 'own.yaml')
+    ran('compare', door_alone, *both, '-o', tmp_path / 'both')
     learned, own = (
         [float(r['residual_um']) for r in rows_of(tmp_path / f'both/residuals_{name}.csv')]
         for name in ('model', 'own')
     )
     assert sum(r**2 for r in own) < 1.3 * sum(r**2 for r in learned)
-    again = paint('refit', door_alone, '--add', 'learned:incidence_deg', '--as-effect', file,
-                  '-o', output)  # fmt: skip
+    again = paint('refit', door_alone, *learn)
     assert_refused(again, 'my_incidence.py is there already', 'give another name')
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'words'),
-    [
-        (('diagnose', 'nowhere.yaml'), ('nowhere.yaml: no such file', 'give a campaign YAML')),
-        (('compare', CAMPAIGN, '--model', 'none.yaml'), ('none.yaml: no such file',)),
-        (('refit', CAMPAIGN, '--add', 'air_drft'), ("'air_drft'", "did you mean 'air_drift'?")),
-        (('refit', CAMPAIGN, '--add', 'mine.py'), ('mine.py',)),
-        (('refit', CAMPAIGN), ("Missing option '--add'",)),
-        (
-            ('refit', CAMPAIGN, '--add', 'edge_build', '--as-effect', 'a.py'),
-            ('learned:COVARIATE',),
-        ),
-        (('diagnose', CAMPAIGN, '--effect-file', 'mine.py'), ('mine.py',)),
-    ],
-)
-def test_bad_input_is_one_line_and_writes_nothing(arguments, words, tmp_path):
-    assert_refused(paint(*arguments, '-o', tmp_path / 'out', cwd=tmp_path), *words)
-    assert not (tmp_path / 'out').exists()
+@pytest.mark.slow
+def test_models_side_by_side_each_given_once(tmp_path, repository):
+    start, other = repository / 'config/model.yaml', tmp_path / 'other.yaml'
+    other.write_text(start.read_text().replace('K1_cm3_per_s: 1.9', 'K1_cm3_per_s: 2.4'))
+    told = figures_of(
+        'compare', SAMPLES / 'measured_door/unseen.yaml', '--model', start, '--model', other,
+        '--json', '-o', tmp_path / 'out',
+    )  # fmt: skip
+    errors = {one['name']: one['rmse_um'] for one in told['models']}
+    assert list(errors) == ['model', 'other']
+    assert told['best'] == min(errors, key=errors.get)
+    assert told['provenance']['models']['other']['planar']['K1_cm3_per_s'] == 2.4
+    page = (tmp_path / 'out/report.html').read_text(encoding='utf-8')
+    assert f'{told["best"]} has the smallest error' in page
+    assert (tmp_path / 'out/residuals_other.csv').is_file()
+
+
+@pytest.fixture(scope='module')
+def jobs(tmp_path_factory) -> Path:
+    """The sample's panel and door as campaigns of their own; the panel calibrated."""
+    folder = tmp_path_factory.mktemp('jobs')
+    shutil.copytree(SAMPLES / 'measured_door', folder, dirs_exist_ok=True)
+    both = yaml.safe_load((folder / 'campaign.yaml').read_text())['experiments']
+    for one in both:
+        text = yaml.safe_dump({'experiments': [one]})
+        (folder / f'{one["name"]}.yaml').write_text(text)
+    ran('calibrate', folder / 'panel.yaml', '-o', folder / 'calibration')
+    return folder
+
+
+def refitted(jobs: Path, campaign: str, output: Path):
+    """What a refit with nothing added prints, warnings included, and its figures."""
+    given = ('--add', 'none', '--model', jobs / 'calibration/model.yaml')
+    done = ran('refit', jobs / campaign, *given, '-o', output)
+    return done.stdout + done.stderr, told_in(output / 'diagnosis.json')
+
+
+@pytest.mark.slow
+def test_the_calibration_is_the_prior_of_the_next_job(jobs: Path, tmp_path: Path):
+    known = read_model_file(jobs / 'calibration/model.yaml').posterior
+    assert known is not None
+    assert known.names == tuple(coordinate.name for coordinate in PATTERN)
+    # The sample's bell has the pattern of eq. (1).
+    size, factor = known.footprint
+    assert size < 0.06
+    assert factor > 1.0
+    text, figures = refitted(jobs, 'door.yaml', tmp_path)
+    shift = figures['pattern_shift']
+    assert set(shift) == {'standard_deviations', 'usual', 'by_coordinate'}
+    assert 0.0 < shift['standard_deviations'] < shift['usual']
+    assert f'pattern moved {shift["standard_deviations"]:.1f} standard deviations' in text
+    assert 'The pattern moved' in (tmp_path / 'report.html').read_text()
+    later = read_model_file(tmp_path / 'model.yaml').posterior
+    assert set(known.readings) < set(later.readings)
+
+
+@pytest.mark.slow
+def test_the_readings_behind_a_calibration_do_not_count_twice(jobs: Path, tmp_path: Path):
+    text, figures = refitted(jobs, 'campaign.yaml', tmp_path)
+    assert figures['pattern_shift'] is None
+    (note,) = (note for note in figures['notes'] if 'is not used' in note)
+    assert 'rests on the readings of panel themselves' in note
+    assert f'warning: {note}\n' in text
+    assert note in (tmp_path / 'report.html').read_text()
+    kinds = sorted((found['kind'], found['of']) for found in figures['random_effects'])
+    assert kinds == [*product(('gauge zero', 'part level'), ('door', 'panel'))]

@@ -1,57 +1,67 @@
-"""The command as a whole: help, mistakes, options, progress, its JSON, interruption."""
+"""The command as a whole: help, mistakes, options, progress, and whether it is well installed."""
 
 import ast
+import inspect
 import io
+import json
+import math
 import os
 import shlex
 import subprocess
 import sys
 from contextlib import redirect_stderr
+from importlib import metadata
 from pathlib import Path
+from typing import Literal
 
 import click
 import pytest
+from click.testing import CliRunner
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
+from paint_deposition.cli import results, samples
 from paint_deposition.cli.main import COMMANDS
 from paint_deposition.cli.main import paint as group
+from paint_deposition.cli.options import options_of
 from paint_deposition.cli.results import Progress
+from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request, given, takes
 from waiting import until
+
+
+def python(program: str, **environment: str) -> list[str]:
+    """The lines that a new process of Python prints."""
+    done = subprocess.run(
+        [sys.executable, '-c', program], env=os.environ | environment, capture_output=True,
+        text=True, check=True,
+    )  # fmt: skip
+    return done.stdout.splitlines()
 
 
 @pytest.mark.parametrize('arguments', [[], ['-h']])
 def test_help_lists_every_command_in_a_line(arguments):
     done = paint(*arguments)
-    assert done.returncode == 0
-    assert done.stderr == ''
+    assert (done.returncode, done.stderr) == (0, '')
     listed = done.stdout.split('Commands:\n')[1].splitlines()
     assert [line.split()[0] for line in listed] == list(COMMANDS)
 
 
 def test_help_comes_at_once():
     """What takes seconds to load is not loaded for it."""
-    program = (
-        'import sys\n'
-        'from paint_deposition.cli.main import COMMANDS, run\n'
-        'codes = [run(["--help"]), run(["--version"]), run(["simulate", "--help"])]\n'
-        'slow = {"numpy", "numba", "scipy", "matplotlib", "rosbags", "rclpy"}\n'
-        'print("loaded", sorted(slow & set(sys.modules)), codes)\n'
-    )
-    done = subprocess.run(
-        [sys.executable, '-c', program], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == 'loaded [] [0, 0, 0]'
+    program = """
+import sys
+from paint_deposition.cli.main import run
+codes = [run(['--help']), run(['--version']), run(['simulate', '--help'])]
+slow = {'numpy', 'numba', 'scipy', 'matplotlib', 'rosbags', 'rclpy'}
+print('loaded', sorted(slow & set(sys.modules)), codes)
+"""
+    assert python(program)[-1] == 'loaded [] [0, 0, 0]'
 
 
-@pytest.mark.parametrize(
-    ('typed', 'offered'),
-    [
-        ('re', ['recommend', 'refit', 'recover']),
-        ('--v', ['--version']),
-        ('plan --fac', ['--faces', '--face-angle-deg']),
-    ],
-)
+@pytest.mark.parametrize(('typed', 'offered'), [
+    ('re', ['recommend', 'refit', 'recover']), ('--v', ['--version']),
+    ('plan --fac', ['--faces', '--face-angle-deg']),
+])  # fmt: skip
 def test_the_shell_completes_commands_and_options(typed, offered):
     line = 'eval "$(_PAINT_COMPLETE=bash_source paint)"'
     words = f'COMP_WORDS=(paint {typed}); COMP_CWORD={len(typed.split())}'
@@ -61,20 +71,15 @@ def test_the_shell_completes_commands_and_options(typed, offered):
 
 
 def test_completing_a_command_loads_none():
-    program = (
-        'import atexit, sys\n'
-        'from paint_deposition.cli.main import run\n'
-        'rooms = lambda: sorted(n for n in sys.modules if n.startswith("paint_deposition.cli."))\n'
-        'atexit.register(lambda: print(rooms()))\n'
-        'run([])\n'
-    )
-    environment = os.environ | {
-        '_PAINT_COMPLETE': 'bash_complete', 'COMP_WORDS': 'paint ', 'COMP_CWORD': '1',
-    }  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, '-c', program], env=environment, capture_output=True, text=True
-    )
-    *offered, loaded = done.stdout.splitlines()
+    program = """
+import atexit, sys
+from paint_deposition.cli.main import run
+rooms = lambda: sorted(n for n in sys.modules if n.startswith('paint_deposition.cli.'))
+atexit.register(lambda: print(rooms()))
+run([])
+"""
+    typed = {'_PAINT_COMPLETE': 'bash_complete', 'COMP_WORDS': 'paint ', 'COMP_CWORD': '1'}
+    *offered, loaded = python(program, **typed)
     assert offered == [f'plain,{name}' for name in COMMANDS]
     assert ast.literal_eval(loaded) == ['paint_deposition.cli.main']
 
@@ -141,10 +146,127 @@ def test_the_clock_runs_within_a_step_and_a_known_share_is_a_bar():
         show('film', 0.25)
         lines = shown(terminal, len(lines) + 3)
     assert lines[-1].startswith('diagnose: film:  25%|')
-
-
-def test_nothing_is_shown_when_piped():
+    # When it is piped nothing is shown.
     pipe = io.StringIO()
     with redirect_stderr(pipe), Progress('plan', after_s=0.0) as show:
         show('film', 0.25)
     assert pipe.getvalue() == ''
+
+
+class Coat(Request):
+    speed_m_per_s: float = given(0.3, 'Of the passes [m/s].', '--speed', above=0.0, most=3.0)
+    passes: int | None = given(None, 'How many.', least=1)
+    lean_rad: float = given(0.0, 'Of the gun.', least=-math.pi / 4, most=math.pi / 4)
+    outward: tuple[float, float, float] | None = given(None, 'To the gun.', metavar='X Y Z')
+    direction: Literal['level', 'upright'] = given('level', 'Of the passes.')
+    one_way: bool = given(False, 'All passes in one direction.')
+
+
+@click.command()
+@options_of(Coat, into='coat')
+def command(coat):
+    click.echo(repr(coat))
+
+
+def sprayed(*words):
+    return CliRunner().invoke(command, [str(word) for word in words])
+
+
+def test_each_field_is_an_option_and_the_command_gets_the_request():
+    words = ('--speed', 0.5, '--passes', 3, '--lean-deg', 30, '--outward', 0, -1, 0)
+    done = sprayed(*words, '--direction', 'upright', '--one-way')
+    expected = Coat(
+        speed_m_per_s=0.5, passes=3, lean_rad=math.radians(30), outward=(0, -1, 0),
+        direction='upright', one_way=True,
+    )  # fmt: skip
+    assert done.output.strip() == repr(expected)
+    assert sprayed().output.strip() == repr(Coat())
+
+
+def test_help_shows_text_default_and_bounds():
+    text = ' '.join(sprayed('--help').output.split())
+    assert '--speed FLOAT RANGE Of the passes [m/s]. [default: 0.3; 0.0<x<=3.0]' in text
+    assert '--outward X Y Z' in text
+    assert '--direction [level|upright]' in text
+
+
+def test_a_verb_shows_the_fields_of_its_request():
+    @takes(Coat)
+    def spray(model, *, frame_id='part', **wanted):
+        return Coat(**wanted)
+
+    shown = inspect.signature(spray).parameters
+    assert list(shown)[:3] == ['model', 'frame_id', 'speed_m_per_s']
+    assert shown['speed_m_per_s'].default == 0.3
+
+
+@pytest.mark.parametrize('kind', [MotionOptions, OnePart, FilmBand])
+def test_options_are_the_keys_of_files_in_the_same_words(kind):
+    command = group.get_command(click.Context(group), 'simulate')
+    helps = {option.name: option.help for option in command.params if option.name}
+    for name, field in kind.model_fields.items():
+        assert helps[name] == field.description, name
+
+
+def findings(code: int) -> dict[str, dict]:
+    done = paint('doctor', '--json')
+    assert (done.returncode, done.stderr) == (code, '')
+    told = json.loads(done.stdout)
+    assert told['well'] == (done.returncode == 0)
+    return {one['name']: one for one in told['findings']}
+
+
+@pytest.mark.slow
+def test_a_complete_installation_is_well():
+    middleware = pytest.importorskip('rclpy').get_rmw_implementation_identifier()
+    found = findings(0)
+    assert f'numpy {metadata.version("numpy")}' in found['libraries']['found'].split(', ')
+    assert middleware in found['ROS 2']['found']
+    for name in ('libraries', 'known film', 'live = offline'):
+        assert found[name]['ok'] is True
+    assert not [one for one in found.values() if one['remedy'] and one['ok'] is not None]
+
+
+@pytest.mark.slow
+def test_a_film_that_is_not_the_known_one_is_an_error(monkeypatch):
+    monkeypatch.setattr(samples, 'KNOWN_FILM_UM', samples.KNOWN_FILM_UM * (1 + 2e-4))
+    found = findings(1)
+    assert [one['name'] for one in found.values() if one['ok'] is False] == ['known film']
+    assert found['known film']['remedy']
+
+
+def test_a_library_that_is_missing_or_too_old_is_an_error_unless_an_extra_wants_it(monkeypatch):
+    wanted = ['click>=99', 'nowhere>=3', 'numpy', 'elsewhere>=2; extra == "many"']
+    monkeypatch.setattr(metadata, 'requires', lambda package: wanted)
+    monkeypatch.setattr(samples, '_known_film', lambda: iter(()))
+    found = findings(1)
+    assert found['libraries']['remedy'] == "pip install 'click>=99' 'nowhere>=3'"
+    told = {'ok': None, 'remedy': "pip install 'elsewhere>=2'", 'found': 'elsewhere missing'}
+    assert found['extra many'] == told | {'name': 'extra many'}
+
+
+def test_what_cannot_be_looked_at_is_an_error_with_a_remedy(monkeypatch):
+    def broken():
+        raise RuntimeError("cannot cache function '_fill': no locator available")
+
+    monkeypatch.setattr(samples, '_known_film', broken)
+    done = paint('doctor')
+    assert done.returncode == 1
+    assert 'BAD broken' in done.stdout
+    assert '-> set NUMBA_CACHE_DIR to a folder that can be written' in done.stdout
+    assert done.stdout.endswith('paint does not work as it should\n')
+
+
+def test_no_other_python_takes_a_module_from_the_current_folder(tmp_path, monkeypatch):
+    """Those of `doctor` and of `watch --live`: they start from the same list of words."""
+    middleware = pytest.importorskip('rclpy').get_rmw_implementation_identifier()
+    for name in ('numpy', 'rclpy', 'mine'):
+        (tmp_path / f'{name}.py').write_text('open("ran", "w")')
+    monkeypatch.chdir(tmp_path)
+    found = {one.name: one for one in samples._ros()}
+    assert middleware in found['ROS 2'].found
+    command = results.python('import numpy; print(numpy.array(sys.argv[1:]))\nimport mine', 'a')
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.stdout == "['a']\n"
+    assert "No module named 'mine'" in done.stderr
+    assert not (tmp_path / 'ran').exists()

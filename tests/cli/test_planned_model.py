@@ -1,16 +1,15 @@
 """A plan's own files, simulated without --model: the film is the planned one."""
 
-import json
 import shutil
 
 import numpy as np
 import pytest
-from rosbags.highlevel import AnyReader
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import ran
+from cli.command import COARSE, ran, rows_of, told_in
 from paint_deposition.files.provenance import model_digest, model_of_plan, origin, planned_model
+from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.motion.programmed import PROGRAMMED
 
 PANEL = SAMPLES / 'panel.stl'
@@ -29,44 +28,29 @@ def model_file(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
-def plan(model_file, tmp_path_factory):
+def plan(model_file):
     """A plan for a model that is not the default, in the part's frame."""
-    return planned(tmp_path_factory.mktemp('plan') / 'job', model_file)
-
-
-@pytest.fixture(scope='module')
-def placed(model_file, tmp_path_factory):
-    """The same for a part in the robot's frame."""
-    folder = tmp_path_factory.mktemp('placed') / 'job'
-    return planned(folder, model_file, '--part-pose', *PART_POSE)
+    return planned(model_file.with_name('job'), model_file)
 
 
 def planned(folder, model_file, *more):
-    done = ran(
-        'plan', '--mesh', PANEL, '--model', model_file, '--target-um', 20, '--index', 0.15,
-        '--max-edge-length-m', 0.05, *more, '-o', folder,
-    )  # fmt: skip
-    first = done.stdout.splitlines()[0]
+    given = ('--mesh', PANEL, '--model', model_file, '--target-um', 20, '--index', 0.15)
+    first = ran('plan', *given, *COARSE, *more, '-o', folder).stdout.splitlines()[0]
     assert first.startswith(f'model: {model_file} (')
     assert first.endswith('effects: tcp_standoff')
     return folder
 
 
 def simulated(motion, out, *more):
-    done = ran(
-        'simulate', '--mesh', PANEL, '--trajectory', motion, '--max-edge-length-m', 0.05, *more,
-        '-o', out,
-    )  # fmt: skip
-    return json.loads((out / 'stats.json').read_text()), done
+    done = ran('simulate', '--mesh', PANEL, '--trajectory', motion, *COARSE, *more, '-o', out)
+    return told_in(out / 'stats.json'), done
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ('motion', 'exact'), [('trajectory', 1e-5), ('passes.mod', 0.02), ('passes.csv', 0.02)]
-)
-def test_the_film_is_the_planned_one(motion, exact, plan, tmp_path):
+@pytest.mark.parametrize('motion', ['trajectory', 'passes.mod', 'passes.csv'])
+def test_the_film_is_the_planned_one(motion, plan, tmp_path):
     """The bag to the last digits; module and table leave out acceleration, outside the part."""
-    expected = json.loads((plan / 'plan.json').read_text())['film']
+    expected, exact = told_in(plan / 'plan.json')['film'], 1e-5 if motion == 'trajectory' else 0.02
     film, done = simulated(plan / motion, tmp_path / 'out')
     first = done.stdout.splitlines()[0]
     model = (plan / motion if motion == 'trajectory' else plan) / 'model.yaml'
@@ -80,8 +64,9 @@ def test_the_film_is_the_planned_one(motion, exact, plan, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_plan_in_the_robots_frame_lays_the_same_film(plan, placed):
+def test_a_plan_in_the_robots_frame_lays_the_same_film(plan, model_file, tmp_path):
     """The bag tells the pose of the part itself; the module has it in its work object."""
+    placed = planned(tmp_path / 'job', model_file, '--part-pose', *PART_POSE)
     expected = pd.read_recording(plan / 'trajectory')
     told = pd.read_recording(placed / 'trajectory')
     given = pd.read_recording(placed / 'trajectory', part_pose=PART_POSE)
@@ -89,15 +74,13 @@ def test_a_plan_in_the_robots_frame_lays_the_same_film(plan, placed):
     assert np.allclose(given.positions_m, expected.positions_m, atol=1e-5)
     brought = "static transforms: poses brought from 'base_link' to 'part'"
     assert any(brought in note for note in told.notes)
-    table = np.genfromtxt(placed / 'passes.csv', delimiter=',', names=True)
-    first = np.array([table[0][name] for name in ('x_m', 'y_m', 'z_m')])
-    with AnyReader([placed / 'trajectory']) as bag:
-        poses = [c for c in bag.connections if c.topic == '/atomizer/pose']
-        connection, _, data = next(bag.messages(poses))
-        pose = bag.deserialize(data, connection.msgtype)
+    first, *_ = rows_of(placed / 'passes.csv')
+    with open_bag(placed / 'trajectory') as bag:
+        _, _, pose = next(bag.decoded(['/atomizer/pose']))
     assert pose.header.frame_id == 'base_link'
     place = pose.pose.position
-    assert np.allclose(first, [place.x, place.y, place.z], atol=1e-5)
+    row = [float(first[name]) for name in ('x_m', 'y_m', 'z_m')]
+    assert np.allclose(row, [place.x, place.y, place.z], atol=1e-5)
     module, same = (
         pd.read_recording(folder / 'passes.mod', part_pose=pose)
         for folder, pose in ((placed, PART_POSE), (plan, None))
@@ -115,10 +98,7 @@ def test_a_model_that_is_given_wins_and_is_named(plan, tmp_path):
     _, done = simulated(bag, tmp_path / 'other', '--model', tmp_path / 'other.yaml')
     assert done.stdout.startswith(f"model: {tmp_path / 'other.yaml'} 'bell 7' (")
     assert f'note: {bag} was planned with another model' in done.stderr
-
-
-@pytest.mark.slow
-def test_a_module_away_from_its_model_is_warned_of(plan, tmp_path):
+    # A module away from its model is warned of.
     shutil.copy(plan / 'passes.mod', tmp_path)
     _, done = simulated(tmp_path / 'passes.mod', tmp_path / 'out')
     warning = next(line for line in done.stderr.splitlines() if line.startswith('warning: '))

@@ -1,7 +1,6 @@
 """`paint inspect` and `paint recover`, as a user runs them."""
 
 import json
-from importlib.util import find_spec
 
 import pytest
 import trimesh
@@ -10,55 +9,42 @@ from booth import SAMPLES
 from cli.command import assert_refused, figures_of, paint, ran
 from files.recorded import straight_pass
 from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.provenance import sha256
 from paint_deposition.files.recordings.bags import write_pose_bag
-
-
-@pytest.fixture
-def cut_run(tmp_path):
-    folder = write_pose_bag(tmp_path / 'run', straight_pass(4_000))
-    path = folder / 'run_0.mcap'
-    content = path.read_bytes()
-    path.write_bytes(content[: int(0.7 * len(content))])
-    (folder / 'metadata.yaml').unlink()
-    return folder
 
 
 @pytest.mark.slow
 def test_inspect_a_real_bag(shared_data):
-    done = paint('inspect', shared_data / 'bags/evo_ROS_example.bag')
-    assert done.returncode == 0
+    done = ran('inspect', shared_data / 'bags/evo_ROS_example.bag')
     assert done.stderr == ''
     line = next(line for line in done.stdout.splitlines() if line.startswith('poses on groundtr'))
     assert "12765 in frame 'groundtruth' over 889.019 s" in line
     assert '95 gaps, longest interval 2.041 s' in line
+    done = ran('inspect', shared_data / 'bags/evo_nav2_turtlebot.mcap')
+    assert 'transforms: --tf TARGET SOURCE takes the motion from them' in done.stdout
 
 
-def test_recover_does_what_inspect_says_of_an_unfinished_run(cut_run, tmp_path):
+def test_recover_does_what_inspect_says_of_an_unfinished_run(tmp_path):
+    cut_run = write_pose_bag(tmp_path / 'run', straight_pass(4_000))
+    content = (cut_run / 'run_0.mcap').read_bytes()
+    (cut_run / 'run_0.mcap').write_bytes(content[: int(0.7 * len(content))])
+    (cut_run / 'metadata.yaml').unlink()
     done = paint('inspect', cut_run)
     assert_refused(done)
     assert done.stderr.endswith(f'run: paint recover {cut_run}\n')
     figures = figures_of('recover', cut_run, '-o', tmp_path / 'whole', '--json')
+    # A gap that is longer than clocks count is none.
+    told = ran('inspect', tmp_path / 'whole', '--max-pose-gap-s', '1e300').stdout
+    assert ' 0 gaps' in told
     assert figures['messages'] == sum(figures['topics'].values()) > 2_000
-    done = paint('recover', cut_run)
-    assert done.returncode == 0
+    done = ran('recover', cut_run)
     assert done.stderr == ''
     first, *_, last = done.stdout.splitlines()
     assert first.endswith('the end is missing')
     assert last.endswith('messages recovered: ' + str(tmp_path / 'run_recovered'))
     assert len(read_recording(tmp_path / 'run_recovered')) > 2_000
-    again = paint('recover', cut_run)
-    assert_refused(again, 'run_recovered already exists; choose another name')
-
-
-def test_a_gap_longer_than_clocks_count_is_none(tmp_path):
-    folder = write_pose_bag(tmp_path / 'run', straight_pass(100))
-    done = ran('inspect', folder, '--max-pose-gap-s', '1e300')
-    assert ' 0 gaps' in done.stdout
-
-
-@pytest.mark.parametrize('command', ['inspect', 'recover'])
-def test_nothing_there_is_one_line(command, tmp_path):
-    assert_refused(paint(command, 'nowhere', cwd=tmp_path), 'nowhere')
+    refusal = 'run_recovered already exists; choose another name'
+    assert_refused(paint('recover', cut_run), refusal)
 
 
 def test_a_table_of_poses_says_what_was_understood(tmp_path):
@@ -73,9 +59,6 @@ def test_a_table_of_poses_says_what_was_understood(tmp_path):
     assert stream.startswith('50.0 a second, 0 gaps, longest interval 0.020 s, 0 repeated and 0')
     told = figures_of('inspect', tmp_path / 'poses.csv', '--json')
     assert told['high_m'] == [0.095, 0.0, 0.0]
-
-
-def test_a_table_with_quaternions_is_one_of_poses(tmp_path):
     (tmp_path / 'poses.csv').write_text('t,x,y,z,qx,qy,qz,qw,value\n0,0,0,0,0,0,0,1,20\n')
     assert figures_of('inspect', tmp_path / 'poses.csv', '--json')['poses'] == 1
 
@@ -88,18 +71,15 @@ def test_a_table_of_readings_says_its_zeros_repeats_and_gaps(tmp_path):
     assert '(1 of them without a reading: 3)' in done.stdout
     assert '4 readings at 3 points, 1 of them measured again: noise of the gauge' in done.stdout
     assert 'film 0.0 to 23.0 µm, mean 16.2 µm\nx 0.000 to 2.000' in done.stdout
-    done = paint('inspect', 'door.csv', '--points', 'points.csv', '--json', cwd=tmp_path)
-    figures = json.loads(done.stdout)
+    figures = figures_of('inspect', 'door.csv', '--points', 'points.csv', '--json', cwd=tmp_path)
     assert (figures['zeros'], figures['repeated'], figures['readings']) == (['2'], ['1'], 4)
     assert_refused(paint('inspect', 'door.csv', cwd=tmp_path), 'have no coordinates', '--points')
-    batch = tmp_path / 'B1'
-    batch.mkdir()
-    (batch / 'header.txt').write_text('Name,B1\n')
-    (batch / 'readings.txt').write_text('Reading,Value\n1,20\n2,21\n3,22\n4,21\n')
-    films = ', '.join(f'{{"thickness": {film}}}' for film in (20, 21, 22, 21))
-    (tmp_path / 'b.json').write_text(f'[{films}]')
+    (tmp_path / 'B1').mkdir()
+    (tmp_path / 'B1/header.txt').write_text('Name,B1\n')
+    (tmp_path / 'B1/readings.txt').write_text('Reading,Value\n1,20\n2,21\n3,22\n4,21\n')
+    (tmp_path / 'b.json').write_text(json.dumps([{'thickness': um} for um in (20, 21, 22, 21)]))
     for name in ('B1', 'b.json'):
-        done = paint('inspect', name, '--points', 'points.csv', cwd=tmp_path)
+        done = ran('inspect', name, '--points', 'points.csv', cwd=tmp_path)
         assert '4 readings at 4 points' in done.stdout
 
 
@@ -120,49 +100,23 @@ def test_a_table_with_every_sample_twice_says_the_rate_without_them(tmp_path):
     assert 'they are dropped, and 125 a second are left' in done.stderr
 
 
-@pytest.mark.parametrize(
-    ('scale', 'words'),
-    [(1.0, 'taken for metres'), (1e3, 'looks like millimetres, else it would be 1200 m large')],
-)
-def test_a_mesh_says_its_size_and_unit(panel, scale, words, tmp_path):
-    mesh = trimesh.load_mesh(panel)
-    mesh.apply_scale(scale).export(tmp_path / 'part.stl')
-    first, unit, box = paint('inspect', tmp_path / 'part.stl').stdout.splitlines()
-    assert first == 'part.stl: a mesh of 2 triangles, 1.200 x 0.000 x 0.800 m, 0.96 m2'
-    assert words in unit
-    assert box == 'x -0.600 to 0.600, y 0.000 to 0.000, z -0.400 to 0.400 m'
-
-
-def test_a_mesh_is_read_with_the_scale_and_the_body_that_are_given(panel, tmp_path):
-    trimesh.load_mesh(panel).apply_scale(1e3).export(tmp_path / 'part.stl')
+def test_a_mesh_says_its_size_and_unit(panel, tmp_path):
+    """It is read with the scale and the body that are given."""
+    part, mesh = tmp_path / 'part.stl', trimesh.load_mesh(panel)
+    for scale, words in (
+        (1.0, 'taken for metres'),
+        (1e3, 'looks like millimetres, else it would be 1200 m large'),
+    ):
+        mesh.apply_scale(scale).export(part)
+        first, unit, box = ran('inspect', part).stdout.splitlines()
+        assert first == 'part.stl: a mesh of 2 triangles, 1.200 x 0.000 x 0.800 m, 0.96 m2'
+        assert words in unit
+        assert box == 'x -0.600 to 0.600, y 0.000 to 0.000, z -0.400 to 0.400 m'
     given = ('--mesh-scale', 0.001, '--body', 'part')
-    figures = figures_of('inspect', tmp_path / 'part.stl', *given, '--json')
+    figures = figures_of('inspect', part, *given, '--json')
     assert (figures['mesh_scale'], figures['high_m'][0]) == (0.001, pytest.approx(0.6))
-    assert 'read with --mesh-scale 0.001' in ran('inspect', tmp_path / 'part.stl', *given).stdout
-    assert_refused(paint('inspect', tmp_path / 'part.stl', '--body', 'lid'), "no body 'lid'")
-
-
-@pytest.mark.parametrize(
-    ('file', 'given', 'what'),
-    [
-        ('door.stl', '--tf a b', 'a mesh'), ('door.stl', '--max-edge-length-m 0.1', 'a mesh'),
-        ('door.csv', '--strict', 'gauge readings'),
-        ('door.csv', '--mesh-scale 1', 'gauge readings'),
-        ('door_horizontal', '--body door', 'a bag'), ('door_horizontal', '--frame-id a', 'a bag'),
-        ('poses.csv', '--tool-axis x', 'a table of poses'),
-    ],
-)  # fmt: skip
-def test_what_does_nothing_is_refused(file, given, what, tmp_path):
-    (tmp_path / 'poses.csv').write_text('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n')
-    (tmp_path / 'door.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
-    path = tmp_path / file if file.endswith('.csv') else SAMPLES / file
-    words = given.split()
-    assert_refused(paint('inspect', path, *words), f'{words[0]}: not for {what}; leave it')
-
-
-def test_a_bag_without_poses_says_where_its_motion_is(shared_data):
-    done = paint('inspect', shared_data / 'bags' / 'evo_nav2_turtlebot.mcap')
-    assert 'transforms: --tf TARGET SOURCE takes the motion from them' in done.stdout
+    assert 'read with --mesh-scale 0.001' in ran('inspect', part, *given).stdout
+    assert_refused(paint('inspect', part, '--body', 'lid'), "no body 'lid'")
 
 
 def test_inspect_a_real_program(shared_data):
@@ -177,27 +131,16 @@ def test_inspect_a_real_program(shared_data):
     assert content['moves'][0]['position_m'] == [0.61391, 2.32615, 1.04068]
 
 
-def test_the_name_of_a_file_is_no_option(panel, tmp_path):
-    path = tmp_path / 'part_pose.csv'
-    done = paint('simulate', '--mesh', panel, '--trajectory', path, '-o', tmp_path / 'out')
-    assert_refused(done, f'{path}: no such file')
+def test_provenance_names_each_file_with_its_digest():
+    bag = SAMPLES / 'door_horizontal'
+    (file,) = figures_of('inspect', bag, '--json')['provenance']['files']
+    assert file == {'what': 'recording', 'file': str(bag), 'sha256': sha256(bag)}
 
 
-def test_a_program_has_no_topics_and_a_bag_no_gun_signal(tmp_path):
-    module = tmp_path / 'passes.mod'
-    module.write_text('')
-    given = ('--mesh', SAMPLES / 'door.stl', '-o', tmp_path / 'out', '--trajectory')
-    done = paint('simulate', *given, module, '--state-topic', '/atomizer/state')
-    assert_refused(done, '--state-topic is for bags', 'is a RAPID module; leave it out')
-    for command in (('inspect',), ('simulate', *given)):
-        done = paint(*command, SAMPLES / 'door_horizontal', '--gun-signal', 'doGun')
-        assert_refused(done, '--gun-signal is for RAPID modules')
-
-
-@pytest.mark.skipif(find_spec('rerun') is not None, reason='Rerun would open a window')
-@pytest.mark.parametrize(
-    ('run', 'words'),
-    [(SAMPLES, 'no .mcap file'), (SAMPLES / 'door_horizontal', 'pip install rerun-sdk')],
-)
-def test_a_run_that_rerun_cannot_show_says_why(run, words):
-    assert_refused(paint('view', run), words)
+def test_a_digest_changes_with_content_and_with_names(tmp_path):
+    (tmp_path / 'a').write_text('film')
+    first = sha256(tmp_path)
+    (tmp_path / 'a').rename(tmp_path / 'b')
+    renamed = sha256(tmp_path)
+    (tmp_path / 'b').write_text('films')
+    assert len({first, renamed, sha256(tmp_path)}) == 3

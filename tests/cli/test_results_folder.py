@@ -4,6 +4,9 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
+from contextlib import nullcontext
+from multiprocessing import get_context
 
 import pytest
 
@@ -66,18 +69,16 @@ def test_files_and_folders_of_the_users_own_are_not_replaced(tmp_path, name):
     assert mine.read_text() == 'mine'
 
 
-@pytest.mark.parametrize(
-    'line', ['..', '.', '', '../mine.txt', '../other', '/{0}', 'a/../../mine.txt']
-)
-def test_a_marker_names_nothing_outside_its_folder(tmp_path, line):
-    write(tmp_path / 'out', 'film.csv')
+def test_a_marker_names_nothing_outside_its_folder(tmp_path):
     write(tmp_path / 'other', 'film.csv')
     (tmp_path / 'mine.txt').write_text('mine')
-    (tmp_path / 'out' / MARKER).write_text(f'{line.format(tmp_path)}\nfilm.csv\n')
-    write(tmp_path / 'out', 'model.yaml')
-    assert names_in(tmp_path / 'out') == ['model.yaml']
-    assert names_in(tmp_path) == ['mine.txt', 'other', 'out']
-    assert names_in(tmp_path / 'other') == ['film.csv']
+    for line in ('..', '.', '', '../mine.txt', '../other', f'/{tmp_path}', 'a/../../mine.txt'):
+        write(tmp_path / 'out', 'film.csv')
+        (tmp_path / 'out' / MARKER).write_text(f'{line}\nfilm.csv\n')
+        write(tmp_path / 'out', 'model.yaml')
+        assert names_in(tmp_path / 'out') == ['model.yaml'], line
+        assert names_in(tmp_path) == ['mine.txt', 'other', 'out']
+        assert names_in(tmp_path / 'other') == ['film.csv']
 
 
 @pytest.mark.parametrize('name', ['notes', 'link'])
@@ -90,42 +91,37 @@ def test_what_a_marker_names_is_no_leave_for_a_folder_or_a_link(tmp_path, name):
     if name == 'link':
         (tmp_path / 'out/link').symlink_to(tree)
     (tmp_path / 'out' / MARKER).write_text(f'film.csv\n{name}\n')
-    if name == 'notes':
-        with pytest.raises(PaintError, match=r'readings\.csv was not written by paint'):
-            write(tmp_path / 'out', 'model.yaml')
-        assert (tmp_path / 'out/film.csv').exists()
-    else:
+    refusal = pytest.raises(PaintError, match=r'readings\.csv was not written by paint')
+    with refusal if name == 'notes' else nullcontext():
         write(tmp_path / 'out', 'model.yaml')
+    assert (tmp_path / 'out/film.csv').exists() == (name == 'notes')
     assert (tree / 'readings.csv').read_text() == 'mine'
 
 
-# Ends at the given call of those that change the folder, or raises there.
-AT_A_CALL = """
-import os, sys
-from pathlib import Path
-from paint_deposition.cli.results import results_in
-folder, end, call = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3])
-with results_in(folder) as work:
-    (work / 'trajectory').mkdir()
-    for name in ('film.csv', 'stats.json', 'trajectory/bag.mcap'):
-        (work / name).write_text('new')
+def end_at_a_call(folder, end: str, call: int) -> None:
+    """Write results; end at this call of those that change the folder, or with code 3."""
     left = [call]
+
     def counted(function):
-        def call(*args, **more):
+        def called(*args, **more):
             left[0] -= 1
             if left[0] == 0:
                 if end == 'kill':
-                    os.kill(os.getpid(), 9)
+                    os.kill(os.getpid(), signal.SIGKILL)
                 raise OSError(28, 'full')
             return function(*args, **more)
-        return call
-    for name in ('rename', 'replace', 'mkdir'):
-        setattr(os, name, counted(getattr(os, name)))
-print(left[0])
-"""
+
+        return called
+
+    with results_in(folder) as work:
+        (work / 'trajectory').mkdir()
+        for name in ('film.csv', 'stats.json', 'trajectory/bag.mcap'):
+            (work / name).write_text('new')
+        for name in ('rename', 'replace', 'mkdir'):
+            setattr(os, name, counted(getattr(os, name)))
+    sys.exit(3 if left[0] > 0 else 0)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize('end', ['kill', 'full'])
 @pytest.mark.parametrize('others', [True, False], ids=['among_other_files', 'alone'])
 def test_results_are_the_old_or_the_new_wherever_a_command_ends(tmp_path, end, others):
@@ -135,9 +131,10 @@ def test_results_are_the_old_or_the_new_wherever_a_command_ends(tmp_path, end, o
         write(out, 'film.csv', 'old.csv', 'trajectory/bag.mcap', 'trajectory/old.yaml')
         if others:
             (out / 'notes.txt').write_text('mine')
-        words = [sys.executable, '-c', AT_A_CALL, str(out), end, str(call)]
-        done = subprocess.run(words, capture_output=True, text=True)
-        if end == 'kill' and done.returncode:  # the next command puts right what this one left
+        command = get_context('fork').Process(target=end_at_a_call, args=(out, end, call))
+        command.start()
+        command.join()
+        if end == 'kill' and command.exitcode < 0:  # the next puts right what this one left
             with pytest.raises(KeyboardInterrupt):
                 write_half(out, KeyboardInterrupt)
         held = tuple(sorted(p.relative_to(out).as_posix() for p in out.rglob('*')))
@@ -145,30 +142,29 @@ def test_results_are_the_old_or_the_new_wherever_a_command_ends(tmp_path, end, o
         assert ('notes.txt' in held) == others
         is_new = (out / 'film.csv').read_text() == 'new'
         states.add((is_new, held))
-        if int(done.stdout or 0) > 0:  # all calls were made
+        if command.exitcode == 3:  # all calls were made
             break
-    assert done.returncode == 0
+    assert command.exitcode == 3
     assert {is_new for is_new, _ in states} == {True, False}
     assert len(states) == 2, states
 
 
-def test_commands_on_one_folder_take_turns(tmp_path):
-    code = """
-import sys
-from pathlib import Path
-from paint_deposition.cli.results import results_in
-for _ in range(40):
-    with results_in(Path(sys.argv[1])) as work:
-        for k in range(5):
-            (work / f'{sys.argv[2]}{k}').write_text(sys.argv[2])
-"""
-    words = [sys.executable, '-c', code, str(tmp_path / 'out')]
+def test_commands_on_one_folder_take_turns(tmp_path, monkeypatch):
     (tmp_path / 'temporary').mkdir()
-    system = {**os.environ, 'TMPDIR': str(tmp_path / 'temporary')}
-    running = [subprocess.Popen([*words, name], env=system) for name in 'abc']
-    assert [one.wait() for one in running] == [0, 0, 0]
-    held = names_in(tmp_path / 'out')
-    assert held in ([f'{name}{k}' for k in range(5)] for name in 'abc')
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path / 'temporary'))
+    results = [[f'{name}{k}' for k in range(5)] for name in 'abc']
+
+    def write_often(names: list[str]) -> None:
+        for _ in range(40):
+            write(tmp_path / 'out', *names)
+
+    running = [get_context('fork').Process(target=write_often, args=[each]) for each in results]
+    for command in running:
+        command.start()
+    for command in running:
+        command.join()
+    assert [command.exitcode for command in running] == [0, 0, 0]
+    assert names_in(tmp_path / 'out') in results
     assert names_in(tmp_path / 'temporary') == []
 
 

@@ -1,30 +1,57 @@
 """A small paint cell for tests: a panel, a motion over it, the robot and those who look on."""
 
+import socket
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, TransformStamped
+from lifecycle_msgs.msg import TransitionEvent
+from nav_msgs.msg import Path as Passes
+from paint_msgs import msg as paint
 from paint_msgs.msg import AtomizerState
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import JointState, PointCloud2
+from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.transforms import Rigid
+from paint_deposition.nodes.topics import CLOCK, LATCHED, PROGRESS, RESULTS, TRUST_TOPIC
 
 START_NS = 1_760_000_000_000_000_000
 # The tool's z axis along +y, toward a panel that looks to -y.
 FACING_PANEL = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 PANEL_M = 0.8
 TWO_PASSES_POSES = 600
+ALL = QoSProfile(depth=500)
+ALL_LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# What nodes publish, by the last two words of the topic, and how it is heard.
+HEARD = {
+    'atomizer/pose': (PoseStamped, ALL), 'joint_states': (JointState, ALL),
+    'atomizer/state': (AtomizerState, ALL_LATCHED), 'part': (paint.Part, LATCHED),
+    'part_pose': (TransformStamped, LATCHED), 'planned_path': (Passes, LATCHED),
+    'atomizer/progress': (paint.PoseProgress, PROGRESS),
+    'thickness/field': (paint.ThicknessField, RESULTS),
+    'thickness/stats': (paint.ThicknessStats, LATCHED),
+    'thickness/mesh': (Marker, LATCHED), 'thickness/legend': (MarkerArray, LATCHED),
+    'thickness/cloud': (PointCloud2, RESULTS), TRUST_TOPIC: (DiagnosticStatus, LATCHED),
+    'comparison/stats': (paint.ComparisonStats, LATCHED),
+    'comparison/mesh': (Marker, LATCHED), 'comparison/legend': (MarkerArray, LATCHED),
+    'deposition_simulator/transition_event': (TransitionEvent, ALL),
+    'diagnostics': (DiagnosticArray, QoSProfile(depth=100)), 'clock': (Clock, CLOCK),
+}  # fmt: skip
 # A user's effect whose code is new for every number, so that no cache has it compiled. Before it
 # is used it waits for a file `gate`; in a main thread, which poses may be waiting for, it fails.
 OWN_EFFECT = """
@@ -60,9 +87,9 @@ def write_own_model(folder: Path) -> Path:
     return path
 
 
-def write_panel(path: Path, reverse: bool = False) -> Path:
+def write_panel(path: Path, reverse: bool = False, scale: float = 1.0) -> Path:
     """A square that stands in x-z and looks to -y, as STL."""
-    half = PANEL_M / 2
+    half = scale * PANEL_M / 2
     corners = [[-half, 0, -half], [half, 0, -half], [half, 0, half], [-half, 0, half]]
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     trimesh.Trimesh(corners, faces[:, ::-1] if reverse else faces, process=False).export(path)
@@ -88,6 +115,14 @@ def two_passes(poses: int = TWO_PASSES_POSES, trigger: bool = True) -> Trajector
     )
 
 
+def turned(motion: Trajectory, degrees: float) -> Trajectory:
+    """The motion turned about the vertical z."""
+    turn = Rotation.from_euler('z', degrees, degrees=True)
+    quaternions = (turn * Rotation.from_quat(motion.quaternions_xyzw)).as_quat()
+    places = turn.apply(motion.positions_m)
+    return replace(motion, positions_m=places, quaternions_xyzw=quaternions)
+
+
 def offline_um(
     node, trajectory: Trajectory, model: DepositionModel | None = None, precision: str = 'single'
 ) -> np.ndarray:
@@ -101,6 +136,18 @@ def offline_um(
     return integrator.film_um
 
 
+def free_port(kind: int = socket.SOCK_DGRAM) -> int:
+    """A port of this machine that nobody listens on."""
+    with socket.socket(socket.AF_INET, kind) as free:
+        free.bind(('127.0.0.1', 0))
+        return free.getsockname()[1]
+
+
+def saved_um(table: Path | str) -> np.ndarray:
+    """The film in a table that the simulator wrote."""
+    return np.loadtxt(table, delimiter=',', skiprows=1)[:, 3]
+
+
 def parameters(**values: object) -> list[Parameter]:
     """Parameter overrides by name."""
     return [Parameter(name, value=value) for name, value in values.items()]
@@ -109,13 +156,15 @@ def parameters(**values: object) -> list[Parameter]:
 class Robot(Node):
     """Publishes poses and states as a cell would."""
 
-    def __init__(self, context, reliable: bool = True, **options) -> None:
+    def __init__(self, context, reliable: bool = True, latched: bool = False, **options) -> None:
         super().__init__('robot', context=context, **options)
         profile = QoSProfile(depth=2000)
         if not reliable:
             profile.reliability = ReliabilityPolicy.BEST_EFFORT
         self.pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
-        self.state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
+        kept = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        states = kept if latched else profile
+        self.state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', states)
 
     def is_subscribed_by(self, *nodes: Node) -> bool:
         """Both sides know of each other: what is sent from now on arrives."""
@@ -133,9 +182,7 @@ class Robot(Node):
         )
 
     def hearers(self) -> tuple[int, int]:
-        """How many listen to poses and to states as reliably as they are sent: in this process,
-        and in others.
-        """
+        """How many listen as reliably as it sends, in this process and in others."""
         counts = []
         for publisher in (self.pose_publisher, self.state_publisher):
             topic = publisher.topic_name
@@ -215,13 +262,16 @@ class Broadcaster(Node):
 class Onlooker(Node):
     """Subscribes to topics and diagnostics and keeps the bytes of all that it hears."""
 
-    def __init__(self, context, topics: dict[str, tuple[type, QoSProfile]], **options) -> None:
+    def __init__(self, context, *topics: str, **options) -> None:
         super().__init__('onlooker', context=context, **options)
-        topics = topics | {'/diagnostics': (DiagnosticArray, QoSProfile(depth=100))}
-        self.types = {topic: message for topic, (message, _) in topics.items()}
-        self.heard: dict[str, list[bytes]] = {topic: [] for topic in topics}
-        for topic, (message, profile) in topics.items():
-            self.create_subscription(message, topic, self.heard[topic].append, profile, raw=True)
+        self.types: dict[str, type] = {}
+        self.heard: dict[str, list[bytes]] = {}
+        for topic in (*topics, '/diagnostics'):
+            self.heard[topic] = []
+            words = topic.strip('/').split('/')
+            self.types[topic], profile = HEARD['/'.join(words[-2:])]
+            heard = self.heard[topic].append
+            self.create_subscription(self.types[topic], topic, heard, profile, raw=True)
 
     def newest(self, topic: str):
         """The last message of a topic, None if there was none."""
@@ -231,6 +281,10 @@ class Onlooker(Node):
         """Whether the last message of a topic is there and meets a condition."""
         newest = self.newest(topic)
         return newest is not None and condition(newest)
+
+    def all(self, topic: str) -> list:
+        """The messages of a topic so far."""
+        return [self.decoded(topic, row) for row in range(len(self.heard[topic]))]
 
     def decoded(self, topic: str, row: int):
         """A message of a topic, by its number."""

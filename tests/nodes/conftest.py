@@ -56,10 +56,8 @@ def record(start, tmp_path):
     """`record(**parameters)`: a recorder of the run `run`, running."""
     from paint_deposition.nodes.bags.run_recorder import RunRecorder
 
-    def record(**chosen) -> RunRecorder:
-        return start(RunRecorder, **{'output_directory': str(tmp_path), 'name': 'run'} | chosen)
-
-    return record
+    run = {'output_directory': str(tmp_path), 'name': 'run'}
+    return lambda **chosen: start(RunRecorder, **run | chosen)
 
 
 @pytest.fixture
@@ -96,12 +94,23 @@ def robot(ros_context, spin, wait_until):
 
 
 @pytest.fixture
+def simulated(simulator, robot):
+    """`simulated(**parameters)`: a simulator of the panel, and a robot that it hears."""
+
+    def simulated(**values):
+        node = simulator(**values)
+        return node, robot(node)
+
+    return simulated
+
+
+@pytest.fixture
 def onlooker(ros_context, spin):
-    """`onlooker({topic: (type, QoS)})`: a node that keeps what it hears, diagnostics too."""
+    """`onlooker(*topics)`: a node that keeps what it hears, diagnostics too."""
     from nodes.cell import Onlooker
 
-    def onlooker(topics=None) -> Onlooker:
-        node = Onlooker(ros_context, topics or {})
+    def onlooker(*topics) -> Onlooker:
+        node = Onlooker(ros_context, *topics)
         spin(node)
         return node
 
@@ -110,15 +119,15 @@ def onlooker(ros_context, spin):
 
 @pytest.fixture
 def call(wait_until):
-    """`call(node, type, name, request)`: the response of a service, found once."""
+    """`call(node, type, name, **fields)`: the response of a service, found once."""
     clients = {}
 
-    def call(node, service, name, request):
+    def call(node, service, name, /, **fields):
         if (node, name) not in clients:
             clients[node, name] = node.create_client(service, name)
         client = clients[node, name]
         wait_until(client.service_is_ready, what=f'service {name}')
-        future = client.call_async(request)
+        future = client.call_async(service.Request(**fields))
         wait_until(future.done, what=f'answer of {name}')
         return future.result()
 
@@ -127,10 +136,7 @@ def call(wait_until):
 
 @pytest.fixture
 def painted(wait_until):
-    """`painted(node, count)`: wait until so many poses were painted; the film in micrometres.
-
-    By default all poses of `two_passes()`.
-    """
+    """`painted(node, count)`: the film [um] once so many poses, or `two_passes()`, are painted."""
     from nodes.cell import TWO_PASSES_POSES
 
     def painted(node, count: int = TWO_PASSES_POSES) -> np.ndarray:

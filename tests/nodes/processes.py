@@ -6,12 +6,23 @@ import subprocess
 import sys
 from pathlib import Path
 
+from nodes.cell import write_panel
+
+
+def recorder_process(folder: Path, **parameters: object) -> 'NodeProcess':
+    """A recorder of the run `run` in this folder."""
+    chosen = {'output_directory': folder, 'name': 'run'} | parameters
+    return NodeProcess(folder / 'recorder', 'run_recorder', **chosen)
+
+
+def simulator_process(folder: Path, **parameters: object) -> 'NodeProcess':
+    """A simulator of the panel."""
+    mesh = write_panel(folder / 'panel.stl')
+    return NodeProcess(folder / 'simulator', 'deposition_simulator', mesh_file=mesh, **parameters)
+
 
 class NodeProcess:
-    """An executable in a new process; `parameters` go on its command line.
-
-    Output goes to `<log>.out` and `<log>.err`. Use as a context manager: it is killed at the end.
-    """
+    """An executable that writes `<log>.out` and `<log>.err`, and is killed when a `with` ends."""
 
     def __init__(
         self,

@@ -5,14 +5,16 @@ import time
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PointStamped, PoseStamped
+from geometry_msgs.msg import PointStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, UInt16
 
+from nodes import cell
+from nodes.cell import START_NS
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.messages import stamp_ns
@@ -23,15 +25,14 @@ from paint_deposition.nodes.node import ERROR
 from robot_arm import JOINTS, URDF, tip_poses
 
 WAY = np.linspace([0.1, -0.2, 0.3, 0.0, 0.2, -0.1], [0.4, 0.1, 0.1, 0.3, -0.2, 0.5], 40)
-STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Driver(Node):
     """A robot's driver: joint states, best effort as some send them, and signals."""
 
-    def __init__(self, context, signals=()) -> None:
+    def __init__(self, context, signals=(), reliability=ReliabilityPolicy.BEST_EFFORT) -> None:
         super().__init__('driver', context=context)
-        profile = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+        profile = QoSProfile(depth=100, reliability=reliability)
         self.joints = self.create_publisher(JointState, 'joint_states', profile)
         self.signals = {topic: self.create_publisher(kind, topic, 10) for topic, kind in signals}
 
@@ -41,31 +42,13 @@ class Driver(Node):
             message.header.stamp = Time(nanoseconds=int(stamp)).to_msg()
             self.joints.publish(message)
 
+    def say(self, topic: str, value: float) -> None:
+        publisher = self.signals[topic]
+        publisher.publish(publisher.msg_type(data=value))
+
     def has_subscribers(self) -> bool:
         publishers = [self.joints, *self.signals.values()]
         return all(publisher.get_subscription_count() for publisher in publishers)
-
-
-def test_a_driver_that_returns_with_another_quality_of_service_is_heard(
-    source, ros_context, spin, onlooker, wait_until
-):
-    node = source()
-    viewer = onlooker({'atomizer/pose': (PoseStamped, QoSProfile(depth=500))})
-    stamp = 1_760_000_000_000_000_000
-    for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
-        driver = Node('driver', context=ros_context)
-        profile = QoSProfile(depth=100, reliability=reliability)
-        joints = driver.create_publisher(JointState, 'joint_states', profile)
-        spin(driver)
-        wait_until(lambda joints=joints: joints.get_subscription_count() == 1, what='the source')
-        heard = len(viewer.heard['atomizer/pose'])
-        stamp += 4_000_000
-        message = JointState(name=list(JOINTS), position=[0.1] * 6)
-        message.header.stamp = Time(nanoseconds=stamp).to_msg()
-        joints.publish(message)
-        wait_until(lambda n=heard: len(viewer.heard['atomizer/pose']) > n, what='its pose')
-        driver.destroy_node()
-    assert node.poses_published == 2
 
 
 @pytest.fixture
@@ -87,22 +70,40 @@ def driver(ros_context, spin, wait_until):
 
 @pytest.fixture
 def viewer(onlooker):
-    return onlooker(
-        {
-            'atomizer/pose': (PoseStamped, QoSProfile(depth=500)),
-            'atomizer/state': (AtomizerState, STATES),
-        }
-    )
+    return onlooker('atomizer/pose', 'atomizer/state')
+
+
+@pytest.fixture
+def switched(viewer, wait_until):
+    """`switched(count)`: the states, once there are so many."""
+
+    def switched(count: int) -> list[AtomizerState]:
+        heard = viewer.heard['atomizer/state']
+        wait_until(lambda: len(heard) >= count, what=f'{count} states')
+        assert len(heard) == count
+        return viewer.all('atomizer/state')
+
+    return switched
 
 
 def stamps_from_now() -> np.ndarray:
     return time.time_ns() + 4_000_000 * np.arange(len(WAY))
 
 
-@pytest.mark.parametrize(
-    ('given', 'prefix', 'scale'),
-    [({}, '', 1.0), ({'joint_prefix': 'irb_', 'angle_unit': 'deg'}, 'irb_', 180.0 / np.pi)],
-)
+def test_a_driver_that_returns_another_way_is_heard(source, ros_context, spin, wait_until):
+    node = source()
+    for count, quality in ((1, ReliabilityPolicy.RELIABLE), (2, ReliabilityPolicy.BEST_EFFORT)):
+        driver = Driver(ros_context, reliability=quality)
+        spin(driver)
+        wait_until(driver.has_subscribers, what='the source')
+        driver.move([START_NS + 4_000_000 * count], rows=WAY[:1])
+        wait_until(lambda n=count: node.poses_published == n, what='its pose')
+        driver.destroy_node()
+
+
+@pytest.mark.parametrize(('given', 'prefix', 'scale'), [
+    ({}, '', 1.0), ({'joint_prefix': 'irb_', 'angle_unit': 'deg'}, 'irb_', 180.0 / np.pi),
+])  # fmt: skip
 def test_poses_are_those_of_the_bell(source, driver, viewer, wait_until, given, prefix, scale):
     offset = [0.0, 0.02, 0.15, 0.0, np.sin(0.2), 0.0, np.cos(0.2)]
     source(tcp_offset=offset, **given)
@@ -112,9 +113,8 @@ def test_poses_are_those_of_the_bell(source, driver, viewer, wait_until, given, 
     robot.move(stamps, [prefix + name for name in JOINTS], scale * WAY)
     wait_until(lambda: len(viewer.heard['atomizer/pose']) == len(WAY), what='the poses')
     pose = viewer.newest('atomizer/pose')
-    expected = Rigid.of(np.concatenate([column[-1] for column in tip_poses(WAY)])) @ Rigid.of(
-        offset
-    )
+    tip = Rigid.of(np.concatenate([column[-1] for column in tip_poses(WAY)]))
+    expected = tip @ Rigid.of(offset)
     p, q = pose.pose.position, pose.pose.orientation
     assert [p.x, p.y, p.z] == pytest.approx(list(expected.values[:3]), abs=1e-9)
     quaternion = np.array([q.x, q.y, q.z, q.w])
@@ -123,36 +123,29 @@ def test_poses_are_those_of_the_bell(source, driver, viewer, wait_until, given, 
     assert pose.header.stamp == Time(nanoseconds=int(stamps[-1])).to_msg()
 
 
-def test_a_signal_opens_the_gun(source, driver, viewer, wait_until):
+def test_a_signal_opens_the_gun(source, driver, switched):
     source(trigger='/io.data > 3')
     robot = driver(('/io', UInt16))
     for value in (3, 3, 4, 4, 3):
-        robot.signals['/io'].publish(UInt16(data=value))
-    wait_until(lambda: len(viewer.heard['atomizer/state']) == 3, what='the changes')
-    assert viewer.newest('atomizer/state').spraying is False
-    first = viewer.decoded('atomizer/state', 0)
+        robot.say('/io', value)
+    first, *_, last = switched(3)
+    assert last.spraying is False
     assert abs(first.header.stamp.sec - time.time()) < 60.0
 
 
-def test_signals_are_flow_brush_and_programmed_speed(source, driver, viewer, wait_until):
+def test_signals_are_flow_brush_and_programmed_speed(source, driver, switched):
     source(
         trigger='/paint_ml_min > 5', flow='/paint_ml_min', calibrated_flow=250.0,
         brush='/brush_number', speed='/speed_mm_s', speed_scale=0.001,
     )  # fmt: skip
     robot = driver(('/paint_ml_min', Float64), ('/brush_number', UInt16), ('/speed_mm_s', UInt16))
-
-    def say(topic: str, message, states: int) -> None:
-        robot.signals[topic].publish(message)
-        wait_until(lambda: len(viewer.heard['atomizer/state']) == states, what=topic)
-
     # A state needs all of them.
-    say('/paint_ml_min', Float64(data=0.0), states=0)
-    say('/brush_number', UInt16(data=3), states=0)
-    say('/speed_mm_s', UInt16(data=350), states=1)
-    say('/paint_ml_min', Float64(data=300.0), states=2)
-    say('/brush_number', UInt16(data=4), states=3)
-    say('/speed_mm_s', UInt16(data=500), states=4)
-    states = [viewer.decoded('atomizer/state', row) for row in range(4)]
+    for topic, value, count in (
+        ('/paint_ml_min', 0.0, 0), ('/brush_number', 3, 0), ('/speed_mm_s', 350, 1),
+        ('/paint_ml_min', 300.0, 2), ('/brush_number', 4, 3), ('/speed_mm_s', 500, 4),
+    ):  # fmt: skip
+        robot.say(topic, value)
+        states = switched(count)
     assert [state.spraying for state in states] == [False, True, True, True]
     assert [state.flow for state in states] == [0.0, 1.2, 1.2, 1.2]
     assert [state.brush for state in states] == [3, 3, 4, 4]
@@ -160,13 +153,11 @@ def test_signals_are_flow_brush_and_programmed_speed(source, driver, viewer, wai
     assert speeds == pytest.approx([0.35, 0.35, 0.35, 0.5], rel=1e-12)
 
 
-def test_a_signal_that_was_overtaken_takes_effect_with_the_newest(
-    source, driver, viewer, wait_until
-):
+def test_a_signal_that_was_overtaken_takes_effect_with_the_newest(source, driver, switched):
     """Unless the clock was set back."""
     source(trigger='/gun.point.x', flow='/paint.point.x')
     robot = driver(('/gun', PointStamped), ('/paint', PointStamped))
-    for topic, at_ms, value, states in (
+    for topic, at_ms, value, count in (
         ('/paint', 9000, 0.5, 0), ('/gun', 10_000, 1.0, 1), ('/paint', 9980, 0.8, 2),
         ('/paint', 5000, 0.7, 3),
     ):  # fmt: skip
@@ -174,8 +165,7 @@ def test_a_signal_that_was_overtaken_takes_effect_with_the_newest(
         message.header.stamp = Time(nanoseconds=at_ms * 1_000_000).to_msg()
         message.point.x = value
         robot.signals[topic].publish(message)
-        wait_until(lambda n=states: len(viewer.heard['atomizer/state']) == n, what=topic)
-    states = [viewer.decoded('atomizer/state', row) for row in range(3)]
+        states = switched(count)
     assert [(stamp_ns(s.header) // 1_000_000, s.flow) for s in states] == [
         (10_000, 0.5), (10_000, 0.8), (5000, 0.7),
     ]  # fmt: skip
@@ -194,82 +184,60 @@ def test_joint_states_that_are_refused_from_then_on_are_told(monkeypatch):
     assert 'wrist_roll' in status.message
 
 
-def test_a_trigger_alone_switches_a_robot_that_publishes_poses(
-    source, ros_context, spin, wait_until, viewer
-):
+def test_a_trigger_alone_switches_the_gun(source, ros_context, spin, wait_until, viewer, switched):
     """Poses of its own, a Bool of the PLC: sent when it says, unless the clocks differ."""
     node = source(urdf_file='', trigger='/gun')
-    robot = Node('robot', context=ros_context)
+    robot, place = cell.Robot(ros_context), (np.zeros(3), cell.FACING_PANEL, 'cell')
     gun = robot.create_publisher(Bool, '/gun', 10)
-    poses = robot.create_publisher(PoseStamped, 'atomizer/pose', 10)
     spin(robot)
-    wait_until(
-        lambda: gun.get_subscription_count() and poses.get_subscription_count() == 2,
-        what='discovery',
-    )
-
-    def move(stamp: int) -> None:
-        pose = PoseStamped()
-        pose.header.frame_id = 'cell'
-        pose.header.stamp = Time(nanoseconds=stamp).to_msg()
-        poses.publish(pose)
-
+    wait_until(lambda: gun.get_subscription_count())
+    wait_until(lambda: robot.pose_publisher.get_subscription_count() == 2, what='discovery')
     before_ns = time.time_ns()
-    move(before_ns)
+    robot.send_pose(before_ns, *place)
     wait_until(lambda: viewer.heard['atomizer/pose'], what='the pose')
     for value in (True, False):
         gun.publish(Bool(data=value))
-    wait_until(lambda: len(viewer.heard['atomizer/state']) == 2, what='the changes')
-    first = viewer.decoded('atomizer/state', 0)
+    first, _ = switched(2)
     assert (first.spraying, first.header.frame_id) == (True, 'cell')
     assert before_ns <= Time.from_msg(first.header.stamp).nanoseconds <= time.time_ns()
     assert node.count_publishers('atomizer/pose') == 1
     wait_until(lambda: viewer.reports('atomizer_source: robot', 'the robot publishes its poses'))
-    move(before_ns - 30_000_000_000)
+    robot.send_pose(before_ns - 30_000_000_000, *place)
     wait_until(lambda: len(viewer.heard['atomizer/pose']) == 2, what='the other clock')
     gun.publish(Bool(data=True))
     wait_until(lambda: viewer.reports('atomizer_source: signals', '/gun has no stamps', b'\x02'))
-    assert len(viewer.heard['atomizer/state']) == 2
+    switched(2)
 
 
 def test_unusable_signals_are_reported(source, driver, viewer, wait_until):
     source(trigger='/io.level > 1')
     robot = driver(('/io', UInt16))
     robot.move(stamps_from_now(), names=JOINTS[:5], rows=WAY[:, :5])
-    robot.signals['/io'].publish(UInt16(data=1))
+    robot.say('/io', 1)
     wait_until(lambda: viewer.reports('atomizer_source: robot', 'no joint state has all'))
     assert 'wrist_roll' in viewer.status('atomizer_source: robot').message
     told = '/io: UInt16 has no number or Bool at .level'
     wait_until(lambda: viewer.reports('atomizer_source: signals', told, b'\x02'))
 
 
-@pytest.mark.parametrize(
-    ('wrong', 'told'),
-    [
-        ({'/level': math.nan}, '/level: trigger is nan: give a number'),
-        ({'/number': 2.7}, '/number: brush is 2.7: give 0 to'),
-        ({'/number': math.nan}, '/number: brush is nan'),
-        ({'/number': 1e12}, '/number: brush is 1e+12'),
-    ],
-)
-def test_a_signal_that_fails_keeps_the_gun_as_it_was(
-    source, driver, viewer, wait_until, wrong, told
-):
+def test_a_signal_that_fails_keeps_the_gun_as_it_was(source, driver, viewer, wait_until, switched):
     source(trigger='/level > 12', brush='/number')
     robot = driver(('/level', Float64), ('/number', Float64))
-
-    def say(values) -> None:
-        for topic, value in values.items():
-            robot.signals[topic].publish(Float64(data=value))
-
-    say({'/level': 24.0, '/number': 2.0})
-    wait_until(lambda: len(viewer.heard['atomizer/state']) == 1, what='the gun')
-    say(wrong)
-    wait_until(lambda: viewer.reports('atomizer_source: signals', told, b'\x02'), what=told)
-    say({'/number': 2.0, '/level': 3.0})
-    wait_until(lambda: len(viewer.heard['atomizer/state']) == 2, what='the gun closed')
-    states = [viewer.decoded('atomizer/state', row) for row in (0, 1)]
-    assert [(state.spraying, state.brush) for state in states] == [(True, 2), (False, 2)]
+    for row, (topic, wrong, told) in enumerate((
+        ('/level', math.nan, '/level: trigger is nan: give a number'),
+        ('/number', 2.7, '/number: brush is 2.7: give 0 to'),
+        ('/number', math.nan, '/number: brush is nan'),
+        ('/number', 1e12, '/number: brush is 1e+12'),
+    )):  # fmt: skip
+        robot.say('/number', 2.0)
+        robot.say('/level', 24.0)
+        switched(2 * row + 1)
+        robot.say(topic, wrong)
+        wait_until(lambda t=told: viewer.reports('atomizer_source: signals', t, b'\x02'), told)
+        robot.say('/number', 2.0)
+        robot.say('/level', 3.0)
+        states = switched(2 * row + 2)
+        assert [(s.spraying, s.brush) for s in states[-2:]] == [(True, 2), (False, 2)]
 
 
 def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, wait_until):
@@ -277,7 +245,7 @@ def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, 
     robot = driver(('/gun', Bool))
     robot.move(stamps_from_now() - 30_000_000_000)
     wait_until(lambda: len(viewer.heard['atomizer/pose']) == len(WAY))
-    robot.signals['/gun'].publish(Bool(data=True))
+    robot.say('/gun', True)
     told = '/gun has no stamps, and the poses of the robot are sent 29.'
     wait_until(lambda: viewer.reports('atomizer_source: signals', told))
     assert not viewer.heard['atomizer/state']

@@ -6,10 +6,8 @@ import time
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped
-from rclpy.qos import QoSProfile
-from sensor_msgs.msg import JointState
 
+from nodes.cell import free_port
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.nodes.egm_source import EgmSource, EgmStream
@@ -50,9 +48,8 @@ def egm_robot(number: int, tm_ms: int, time_us: int = 0, placed: bool = True) ->
     position = numbered([doubles(DEGREES), place, doubles((1500.0, 0.0))]) + clock
     state = field(1, 3)
     head = numbered([number, tm_ms, 2])
-    return numbered([head, position, position, state, state, 1, doubles((0.0,) * 6), state]) + (
-        field(10, 12.5)
-    )
+    more = state, 1, doubles((0.0,) * 6), state
+    return numbered([head, position, position, state, *more]) + field(10, 12.5)
 
 
 def test_positions_have_the_controllers_clock_and_late_packets_do_not_delay_them():
@@ -111,19 +108,9 @@ def test_a_step_of_the_controllers_clock_does_not_move_the_stamps(step_ms):
 
 
 def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(start, onlooker, wait_until):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(('127.0.0.1', 0))
-        port = free.getsockname()[1]
-    chosen = {
-        'address': '127.0.0.1', 'port': port, 'frame_id': 'wobj', 'external_joints': ['rail'],
-        'external_scales': [0.001],
-    }  # fmt: skip
-    viewer = onlooker(
-        {
-            'atomizer/pose': (PoseStamped, QoSProfile(depth=500)),
-            'joint_states': (JointState, QoSProfile(depth=500)),
-        }
-    )
+    port, viewer = free_port(), onlooker('atomizer/pose', 'joint_states')
+    rail = {'external_joints': ['rail'], 'external_scales': [0.001]}
+    chosen = {'address': '127.0.0.1', 'port': port, 'frame_id': 'wobj'} | rail
     start(EgmSource, **chosen)
     with pytest.raises(PaintError, match=r'cannot listen on .*or give another port'):
         start(EgmSource, **chosen)
@@ -149,20 +136,14 @@ def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(start, onlo
     wait_until(lambda: viewer.reports('egm_source: robot', '2 packets lost, 1 repeated'))
 
 
-@pytest.mark.parametrize(
-    ('axes', 'placed', 'told'),
-    [
-        (3, True, 'packets have 2 external axes'),
-        (0, False, 'packets have no pose: give EGM a tool'),
-    ],
-)
+@pytest.mark.parametrize(('axes', 'placed', 'told'), [
+    (3, True, 'packets have 2 external axes'),
+    (0, False, 'packets have no pose: give EGM a tool'),
+])  # fmt: skip
 def test_what_packets_lack_is_told(start, onlooker, wait_until, monkeypatch, axes, placed, told):
     names = [f'axis_{k}' for k in range(axes)]
-    node = start(
-        EgmSource, address='127.0.0.1', port=16511, external_joints=names,
-        external_scales=[1.0] * axes,
-    )  # fmt: skip
-    viewer = onlooker()
+    given = {'external_joints': names, 'external_scales': [1.0] * axes}
+    node, viewer = start(EgmSource, address='127.0.0.1', port=16511, **given), onlooker()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as robot:
         numbers = iter(range(1, 10_000))
 

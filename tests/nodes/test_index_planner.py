@@ -1,27 +1,26 @@
 """The index planner over real DDS: the service, and passes as an action."""
 
 import math
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticStatus
-from nav_msgs.msg import Path
 from paint_msgs.action import PlanPasses
 from paint_msgs.srv import RecommendIndex
 from rclpy.action import ActionClient
 
 import paint_deposition as pd
 from nodes.cell import PANEL_M, parameters, write_panel
+from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.nodes import topics
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest, PlanRequest
 
-COARSE = {'max_edge_length_m': 0.05, 'speed_m_per_s': 0.25}
 NARROW = pd.DepositionModel(planar=PlanarPattern(K3=0.0, r_m=0.11, sigma1_m=0.045, sigma2_m=0.075))
 
 
@@ -33,34 +32,27 @@ def planner(closed, tmp_path):
 
 @pytest.fixture
 def viewer(onlooker):
-    return onlooker({'planned_path': (Path, topics.LATCHED)})
+    return onlooker('planned_path')
 
 
 @pytest.fixture
 def ask(viewer, call):
     """`ask(**request)`: what the service answers."""
-
-    def ask(**request) -> RecommendIndex.Response:
-        return call(viewer, RecommendIndex, 'recommend_index', RecommendIndex.Request(**request))
-
-    return ask
+    return partial(call, viewer, RecommendIndex, 'recommend_index')
 
 
 def test_answer_is_the_recommendation_or_why_there_is_none(planner, ask, viewer, wait_until):
     node = planner()
-    answer = ask(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
-    expected = recommend(
-        pd.DepositionModel(), IndexRequest(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
-    )
+    wanted = {'speed_m_per_s': 0.2, 'tolerance': 0.1, 'width_m': 1.5}
+    answer = ask(**wanted)
+    expected = recommend(pd.DepositionModel(), IndexRequest(**wanted))
     assert answer.success
-    assert answer.index_m == expected.index_m
-    assert answer.sigma_n == expected.sigma_n
+    for name in ('index_m', 'sigma_n', 'passes', 'cycle_time_s', 'mean_um'):
+        assert getattr(answer, name) == getattr(expected, name)
     assert list(answer.index_range_m) == [0.2, 0.8]
     assert list(answer.window_high_m) == [high for _, high in expected.windows_m]
     assert list(answer.minima_index_m) == [m.index_m for m in expected.minima]
-    assert (answer.passes, answer.travel) == (expected.passes, 'alternating')
-    assert answer.cycle_time_s == expected.cycle_time_s
-    assert answer.mean_um == expected.mean_um
+    assert answer.travel == 'alternating'
     np.testing.assert_array_equal(answer.curve_sigma_n, expected.curve.sigma_n)
     assert answer.standoff_drift_low_m == expected.standoff_drift_m[0]
     assert 'keeps its orientation' in answer.message
@@ -95,27 +87,10 @@ def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path)
     assert ask(speed_m_per_s=0.2, tolerance=0.1).index_m == pytest.approx(0.5 * wide, rel=0.03)
 
 
-def test_passes_are_planned_on_a_mesh_and_latched(planner, viewer, wait_until, tmp_path):
-    mesh = write_panel(tmp_path / 'panel.stl')
-    planner(mesh_file=str(mesh), frame_id='panel', speed_m_per_s=0.0, target_um=15.0)
-    wait_until(lambda: viewer.newest('planned_path'), what='the latched path')
-    path = viewer.newest('planned_path')
-    assert path.header.frame_id == 'panel'
-    at = np.array([[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in path.poses])
-    # The panel stands in x-z and looks to -y; passes run along x, past both its edges.
-    np.testing.assert_allclose(at[:, 1], -0.25, atol=1e-6)
-    assert np.ptp(at[:, 0]) > PANEL_M + 0.4
-    stamps = [p.header.stamp.sec * 10**9 + p.header.stamp.nanosec for p in path.poses]
-    assert all(later > earlier for earlier, later in pairwise(stamps))
-
-
 @pytest.fixture
 def pursue(onlooker, wait_until):
-    """`pursue(cancel_at='', **goal)`: the status, the result and the feedback.
-
-    A goal that is cancelled at a stage must end within two seconds.
-    """
-    user = onlooker({})
+    """`pursue(cancel_at='', **goal)`: status, result, feedback; cancelled it ends within 2 s."""
+    user = onlooker()
 
     def pursue(cancel_at='', **goal):
         client = ActionClient(user, PlanPasses, 'plan_passes')
@@ -138,35 +113,41 @@ def pursue(onlooker, wait_until):
     return pursue
 
 
-def test_passes_are_planned_with_feedback(planner, pursue, viewer, wait_until, tmp_path):
+def test_passes_are_planned_and_latched(planner, pursue, viewer, wait_until, tmp_path):
+    """On the mesh of the node at its start, and for a goal with feedback."""
     mesh = write_panel(tmp_path / 'panel.stl')
-    planner(**COARSE)
+    chosen = {'mesh_file': str(mesh), 'frame_id': 'panel', 'max_edge_length_m': 0.05}
+    planner(**chosen, speed_m_per_s=0.0, target_um=15.0)
+    wait_until(lambda: viewer.newest('planned_path'), what='the latched path')
+    path = viewer.newest('planned_path')
+    assert path.header.frame_id == 'panel'
+    at = np.array([[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in path.poses])
+    # The panel stands in x-z and looks to -y; passes run along x, past both its edges.
+    np.testing.assert_allclose(at[:, 1], -0.25, atol=1e-6)
+    assert np.ptp(at[:, 0]) > PANEL_M + 0.4
+    stamps = [stamp_ns(pose.header) for pose in path.poses]
+    assert all(later > earlier for earlier, later in pairwise(stamps))
+
     status, result, heard = pursue(mesh_file=str(mesh), target_um=15.0, direction='vertical')
     assert status == GoalStatus.STATUS_SUCCEEDED, result.message
-    expected = plan(
-        pd.read_mesh(mesh, max_edge_length_m=0.05),
-        pd.DepositionModel(),
-        PlanRequest(direction='vertical', target_um=15.0),
-    )
+    surface = pd.read_mesh(mesh, max_edge_length_m=0.05)
+    wanted = PlanRequest(direction='vertical', target_um=15.0)
+    expected = plan(surface, pd.DepositionModel(), wanted)
     assert result.message == expected.sentence
     assert (result.passes, result.mean_um) == (len(expected.passes), expected.mean_um)
     assert result.speed_m_per_s == expected.style.speed_m_per_s
     stages = [feedback.stage for feedback in heard]
     assert stages[:2] == ['begin', 'reading the mesh']
     assert {'single passes', 'film'} <= set(stages)
-    wait_until(lambda: viewer.newest('planned_path'), what='the path')
-    path = viewer.newest('planned_path')
-    assert path == result.path
-    assert len(path.poses) > 10
+    wait_until(lambda: viewer.newest('planned_path') == result.path, what='the path')
+    assert len(result.path.poses) > 10
 
 
-def test_the_service_answers_while_passes_are_planned_and_cancel_ends_it(
-    planner, pursue, onlooker, wait_until, tmp_path
-):
+def test_answers_go_on_and_cancel_ends_a_plan(planner, pursue, onlooker, wait_until, tmp_path):
     """What has no answer is aborted with the reason."""
     mesh = write_panel(tmp_path / 'panel.stl')
     planner(max_edge_length_m=0.01, speed_m_per_s=0.25)
-    client = onlooker({}).create_client(RecommendIndex, 'recommend_index')
+    client = onlooker().create_client(RecommendIndex, 'recommend_index')
     wait_until(client.service_is_ready)
     answer = client.call_async(RecommendIndex.Request(speed_m_per_s=0.3))
     status, result, heard = pursue(cancel_at='single passes', mesh_file=str(mesh))

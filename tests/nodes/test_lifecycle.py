@@ -3,15 +3,14 @@
 import os
 import threading
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, TransformStamped
-from lifecycle_msgs.msg import TransitionEvent
+from geometry_msgs.msg import PoseStamped
+from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from paint_msgs.msg import ThicknessStats
 from paint_msgs.srv import SaveFilm
-from rclpy.qos import QoSProfile
 
 from booth import SAMPLES
 from nodes.cell import Robot, offline_um, parameters, two_passes, write_panel
@@ -19,7 +18,6 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.managed_node import ManagedNode
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.topics import LATCHED
 
 MOTION = two_passes()
 EVENTS = '/deposition_simulator/transition_event'
@@ -29,24 +27,22 @@ POSES, STATE = 'deposition_simulator: poses', 'deposition_simulator: state'
 class Manager:
     """Asks one node for transitions, as a lifecycle manager does."""
 
-    def __init__(self, caller, call, name: str) -> None:
-        self._caller, self._call, self._name = caller, call, name
+    def __init__(self, call, name: str) -> None:
+        self._call, self._name = call, name
 
     def __getattr__(self, transition: str):
         """`configure()` and so on: whether it succeeded, and the state after it."""
-        request = ChangeState.Request()
-        request.transition.label = transition
 
         def change() -> tuple[bool, str]:
-            answer = self._call(self._caller, ChangeState, f'{self._name}/change_state', request)
+            wanted = Transition(label=transition)
+            answer = self._call(ChangeState, f'{self._name}/change_state', transition=wanted)
             return answer.success, self.state
 
         return change
 
     @property
     def state(self) -> str:
-        answer = self._call(self._caller, GetState, f'{self._name}/get_state', GetState.Request())
-        return answer.current_state.label
+        return self._call(GetState, f'{self._name}/get_state').current_state.label
 
 
 @pytest.fixture
@@ -57,41 +53,45 @@ def viewer(onlooker):
 @pytest.fixture
 def manager(viewer, call):
     """`manager(node)`: a manager of this node."""
-
-    def manager(node) -> Manager:
-        return Manager(viewer, call, node.get_fully_qualified_name())
-
-    return manager
+    return lambda node: Manager(partial(call, viewer), node.get_fully_qualified_name())
 
 
 def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker, call, painted,
                                              wait_until):  # fmt: skip
+    """Poses that it receives while it is inactive are counted and not painted."""
     node = simulator(autostart=False)
     managed = manager(node)
-    events = onlooker({EVENTS: (TransitionEvent, QoSProfile(depth=50))})
+    events = onlooker(EVENTS)
     assert managed.state == 'unconfigured'
     assert not node.count_subscribers('atomizer/pose')
     assert managed.activate() == (False, 'unconfigured')
     assert managed.configure() == (True, 'inactive')
-    assert managed.activate() == (True, 'active')
     source = robot(node)
-    source.send(MOTION)
-    film = painted(node)
+    source.send(MOTION, slice(0, 300))
+    told = '300 poses came and were not painted'
+    wait_until(lambda: events.reports(POSES, told, b'\x01'))
+    assert managed.activate() == (True, 'active')
+    source.send(MOTION, slice(300, 600))
+    film = painted(node, 300)
+    wait_until(lambda: events.reports(POSES, 'painting', b'\x00'))
+    assert events.value(POSES, 'poses not painted while inactive') == '300'
     assert managed.deactivate() == (True, 'inactive')
-    request = SaveFilm.Request(name='held')
-    saved = call(events, SaveFilm, '/deposition_simulator/save_film', request)
-    assert saved.success
+    assert call(events, SaveFilm, '/deposition_simulator/save_film', name='held').success
     assert managed.activate() == (True, 'active')
     assert np.array_equal(node.film.snapshot().film_um, film)
-    assert np.array_equal(film, offline_um(node, MOTION))
+    # The states count that came before.
+    second_pass = replace(
+        MOTION, stamps_ns=MOTION.stamps_ns[300:], positions_m=MOTION.positions_m[300:],
+        quaternions_xyzw=MOTION.quaternions_xyzw[300:],
+    )  # fmt: skip
+    assert np.array_equal(film, offline_um(node, second_pass))
     assert managed.deactivate() == (True, 'inactive')
     assert managed.cleanup() == (True, 'unconfigured')
     wait_until(lambda: not source.pose_publisher.get_subscription_count())
     assert managed.configure() == (True, 'inactive')
     assert node.film.counts.received == 0
     assert managed.shutdown() == (True, 'finalized')
-    rows = range(len(events.heard[EVENTS]))
-    states = [events.decoded(EVENTS, row).goal_state.label for row in rows]
+    states = [event.goal_state.label for event in events.all(EVENTS)]
     assert states[-2:] == ['shuttingdown', 'finalized']
 
 
@@ -114,47 +114,15 @@ def test_what_callbacks_replace_stays_until_cleanup(simulator, manager, ros_cont
         for source in robots:
             source.send(MOTION, rows, frame_id='cell')
         painted(node, len(robots) * rows.stop)
-    looks = {
-        'thickness/stats': (ThicknessStats, LATCHED),
-        'part_pose': (TransformStamped, LATCHED),
-    }
-    viewer = onlooker(looks)
-    wait_until(
-        lambda: viewer.shows('thickness/stats', lambda s: s.poses_received == len(robots) * 600)
-    )
+    viewer, sent = onlooker('thickness/stats', 'part_pose'), len(robots) * 600
+    wait_until(lambda: viewer.shows('thickness/stats', lambda s: s.poses_received == sent))
     wait_until(lambda: viewer.newest('part_pose'), what='the latched pose of the part')
     assert managed.deactivate() == (True, 'inactive')
     assert managed.cleanup() == (True, 'unconfigured')
     wait_until(lambda: not any(source.has_subscribers(1) for source in robots))
 
 
-def test_poses_received_while_inactive_are_counted_and_not_painted(
-    simulator, robot, manager, painted, viewer, wait_until
-):
-    node = simulator(autostart=False)
-    managed = manager(node)
-    managed.configure()
-    source = robot(node)
-    source.send(MOTION, slice(0, 300))
-
-    told = '300 poses came and were not painted'
-    wait_until(lambda: viewer.reports(POSES, told, b'\x01'))
-    managed.activate()
-    source.send(MOTION, slice(300, 600))
-    film = painted(node, 300)
-    # The states count that came before.
-    second_pass = replace(
-        MOTION, stamps_ns=MOTION.stamps_ns[300:], positions_m=MOTION.positions_m[300:],
-        quaternions_xyzw=MOTION.quaternions_xyzw[300:],
-    )  # fmt: skip
-    assert np.array_equal(film, offline_um(node, second_pass))
-    wait_until(lambda: viewer.reports(POSES, 'painting', b'\x00'))
-    assert viewer.value(POSES, 'poses not painted while inactive') == '300'
-
-
-def test_what_it_reads_can_be_changed_while_it_is_not_configured(
-    simulator, manager, viewer, wait_until, tmp_path
-):
+def test_what_it_reads_may_change_unconfigured(simulator, manager, viewer, wait_until, tmp_path):
     """A part that cannot be read leaves it unconfigured, and it says so."""
     (tmp_path / 'late.stl').write_text('no mesh')
     other = str(write_panel(tmp_path / 'other.stl'))
@@ -192,9 +160,7 @@ class Faulty(ManagedNode):
         raise ZeroDivisionError('by nothing')
 
 
-def test_an_unexpected_error_leads_to_unconfigured(
-    start, ros_context, manager, viewer, wait_until
-):
+def test_an_unforeseen_error_ends_unconfigured(start, ros_context, manager, viewer, wait_until):
     node = start(Faulty, autostart=False)
     managed = manager(node)
     publishers = len(list(node.publishers))
@@ -211,9 +177,7 @@ def test_an_unexpected_error_leads_to_unconfigured(
         Faulty(context=ros_context)
 
 
-def test_a_recorder_writes_one_whole_run_for_each_activation(
-    record, ros_context, spin, manager, wait_until, tmp_path
-):
+def test_each_activation_is_a_whole_run(record, ros_context, spin, manager, wait_until, tmp_path):
     recorder = record(autostart=False)
     managed = manager(recorder)
     source = Robot(ros_context)

@@ -1,91 +1,70 @@
 """Nodes as processes, as in a cell: a bag is replayed, painted and saved; one of them stalls."""
 
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
-from paint_msgs.msg import PoseProgress, ThicknessStats
+from paint_msgs.msg import PoseProgress
 from paint_msgs.srv import SaveFilm
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 
-from nodes.cell import Robot, parameters, two_passes, write_own_model, write_panel
-from nodes.processes import NodeProcess
-from paint_deposition.effects.deposition_model import DepositionModel
+from nodes.cell import Robot, offline_um, parameters, saved_um, two_passes, write_own_model
+from nodes.processes import NodeProcess, recorder_process, simulator_process
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.topics import TRUST_TOPIC, header
 
-SIMULATOR = 'deposition_simulator'
-PLAYER = 'bag_player'
-RECORDER = 'run_recorder'
 EDGE_M = 0.03
 COARSE = {'max_edge_length_m': EDGE_M}
 POSES = 1500
 MOTION = two_passes(poses=POSES, trigger=False)
-STATS = {'thickness/stats': (ThicknessStats, topics.LATCHED)}
+STATS, PROGRESS = 'thickness/stats', 'atomizer/progress'
 # Several processes start one after the other, on a busy machine in half a minute each.
 pytestmark = pytest.mark.timeout(600)
 
 
 @pytest.fixture
 def call(onlooker, call):
-    """`call(type, name, request)`: the response of a service of another process."""
-    return partial(call, onlooker({}))
+    """`call(type, name, **fields)`: the response of a service of another process."""
+    return partial(call, onlooker())
 
 
-def test_a_replay_waits_for_who_is_still_loading_and_gives_the_offline_film(
-    ros_domain, call, onlooker, wait_until, tmp_path
-):
+def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wait_until, tmp_path):
     """The recorder is there at once, the simulator seconds later; both get every pose."""
-    mesh = write_panel(tmp_path / 'panel.stl')
     bag = write_pose_bag(tmp_path / 'motion', two_passes(poses=300))
     replay = {'bag': bag, 'state_topic': '/atomizer/state', 'wait_for_subscribers': 2}
     statistics = onlooker(STATS)
     with (
-        NodeProcess(tmp_path / 'player', PLAYER, **replay) as player,
-        NodeProcess(
-            tmp_path / 'recorder', RECORDER, output_directory=tmp_path, name='run'
-        ) as recorder,
-        NodeProcess(
-            tmp_path / 'simulator', SIMULATOR, mesh_file=mesh, output_directory=tmp_path, **COARSE
-        ) as simulator,
+        NodeProcess(tmp_path / 'player', 'bag_player', **replay) as player,
+        recorder_process(tmp_path) as recorder,
+        simulator_process(tmp_path, output_directory=tmp_path, **COARSE) as simulator,
     ):
-        wait_until(lambda: player.exit_code is not None, what='the replay')
-        assert player.exit_code == 0, player.err
-        wait_until(
-            lambda: statistics.shows('thickness/stats', lambda m: m.poses_received == 300),
-            what='every pose painted',
-        )
-        saved = call(SaveFilm, '/deposition_simulator/save_film', SaveFilm.Request(name='film'))
+        assert player.wait(300.0) == 0, player.err
+        wait_until(lambda: statistics.shows(STATS, lambda m: m.poses_received == 300), 'all poses')
+        saved = call(SaveFilm, '/deposition_simulator/save_film', name='film')
         assert saved.success, saved.message
-        assert call(Trigger, '/run_recorder/stop', Trigger.Request()).success
+        assert call(Trigger, '/run_recorder/stop').success
         assert recorder.wait() == 0, recorder.err
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
     assert len(read_recording(tmp_path / 'run')) == 300
-    live_um = np.loadtxt(tmp_path / 'film.csv', delimiter=',', skiprows=1)[:, 3]
-    integrator = FilmIntegrator(read_mesh(mesh, 1.0, EDGE_M).points(), DepositionModel(), 'double')
-    integrator.add(spray_path(read_recording(bag, None, '/atomizer/state'))[0])
-    offline_um = integrator.film_um
-    assert offline_um.max() > 1.0
-    assert np.abs(live_um - offline_um).max() < 1e-6 * offline_um.max()
+    live_um = saved_um(tmp_path / 'film.csv')
+    surface = read_mesh(tmp_path / 'panel.stl', 1.0, EDGE_M)
+    seen = SimpleNamespace(points=surface.points(), surface=surface)
+    motion = read_recording(bag, None, '/atomizer/state')
+    expected_um = offline_um(seen, motion, precision='double')
+    assert expected_um.max() > 1.0
+    assert np.abs(live_um - expected_um).max() < 1e-6 * expected_um.max()
 
 
 def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(ros_domain, onlooker, wait_until, tmp_path):
     films = tmp_path / 'films'
-    with NodeProcess(
-        tmp_path / 'simulator',
-        SIMULATOR,
-        mesh_file=write_panel(tmp_path / 'panel.stl'),
-        max_edge_length_m=0.004,
-        output_directory=films,
-    ) as simulator:
+    fine = {'max_edge_length_m': 0.004, 'output_directory': films}
+    with simulator_process(tmp_path, **fine) as simulator:
         client = onlooker().create_client(SaveFilm, '/deposition_simulator/save_film')
         wait_until(client.service_is_ready, what='the service')
         client.call_async(SaveFilm.Request(name='film'))
@@ -99,78 +78,55 @@ def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(ros_domain, onlooker, wai
 def test_ctrl_c_while_a_model_is_prepared_ends_it(ros_domain, call, tmp_path):
     """The trial of this effect would never end."""
     own = write_own_model(tmp_path)
-    mesh = write_panel(tmp_path / 'panel.stl')
-    with NodeProcess(
-        tmp_path / 'simulator', SIMULATOR, mesh_file=mesh, allow_user_effects=True
-    ) as simulator:
-        changes = parameters(model_file=str(own))
-        request = SetParameters.Request(parameters=[p.to_parameter_msg() for p in changes])
-        answer = call(SetParameters, '/deposition_simulator/set_parameters', request)
+    with simulator_process(tmp_path, allow_user_effects=True) as simulator:
+        (change,) = (p.to_parameter_msg() for p in parameters(model_file=str(own)))
+        answer = call(SetParameters, '/deposition_simulator/set_parameters', parameters=[change])
         assert answer.results[0].successful, answer.results[0].reason
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
 
 
-def test_a_simulator_that_stalls_for_seconds_loses_nothing(
-    ros_domain, ros_context, spin, wait_until, onlooker, tmp_path
-):
+def test_a_stall_loses_nothing(ros_domain, ros_context, spin, wait_until, onlooker, tmp_path):
     """Stopped as by a debugger or a swapping machine, while a recorder goes on beside it."""
-    mesh = write_panel(tmp_path / 'panel.stl')
     robot, viewer = Robot(ros_context), onlooker(STATS)
     spin(robot)
-    with (
-        NodeProcess(tmp_path / 'sim', 'deposition_simulator', mesh_file=mesh, **COARSE) as sim,
-        NodeProcess(
-            tmp_path / 'rec', 'run_recorder', output_directory=tmp_path, name='run'
-        ) as recorder,
-    ):
+    with simulator_process(tmp_path, **COARSE) as sim, recorder_process(tmp_path) as recorder:
         wait_until(lambda: robot.has_subscribers(2), what='both')
         robot.send(MOTION, slice(0, 300))
-        wait_until(lambda: viewer.newest('thickness/stats'), what='statistics')
+        wait_until(lambda: viewer.newest(STATS), what='statistics')
         sim.stall()
         # More than a second of the middleware's own patience, less than the queues hold.
         robot.send(MOTION, slice(300, POSES))
         sim.go_on()
-
-        def all_painted() -> bool:
-            return viewer.newest('thickness/stats').poses_received == POSES
-
-        wait_until(all_painted, what='all poses painted')
-        assert viewer.newest('thickness/stats').poses_rejected == 0
+        wait_until(lambda: viewer.newest(STATS).poses_received == POSES, what='all poses painted')
+        assert viewer.newest(STATS).poses_rejected == 0
         recorder.interrupt_as_launch_does()
         assert recorder.wait() == 0, recorder.err
         assert 'file complete: ' in recorder.err.splitlines()[-1]
     assert np.array_equal(read_recording(tmp_path / 'run').stamps_ns, MOTION.stamps_ns)
 
 
-def test_a_film_is_in_doubt_while_its_recorder_is_stalled(
-    simulator, robot, ros_domain, wait_until, onlooker, tmp_path
-):
+def test_a_film_may_be_in_doubt(simulator, robot, ros_domain, wait_until, onlooker, tmp_path):
     """And once a pose was refused, until the next part."""
-    node, trust = simulator(), onlooker({TRUST_TOPIC: (DiagnosticStatus, topics.LATCHED)})
+    node, trust = simulator(), onlooker(TRUST_TOPIC)
 
     def says(level: bytes, words: str) -> bool:
         return trust.shows(TRUST_TOPIC, lambda s: s.level == level and words in s.message)
 
-    with NodeProcess(
-        tmp_path / 'rec', 'run_recorder', output_directory=tmp_path, name='run'
-    ) as recorder:
+    with recorder_process(tmp_path) as recorder:
         source = robot(node)
         wait_until(lambda: source.has_subscribers(2), what='both')
         source.send(MOTION, slice(0, 100))
         wait_until(lambda: node.film.counts.received == 100)
-        reports = onlooker({'atomizer/progress': (PoseProgress, topics.PROGRESS)})
-        wait_until(
-            lambda: reports.shows('atomizer/progress', lambda p: p.reporter == '/run_recorder'),
-            what='its report',
-        )
+        reports, of_it = onlooker(PROGRESS), lambda report: report.reporter == '/run_recorder'
+        wait_until(lambda: reports.shows(PROGRESS, of_it), what='its report')
         wait_until(lambda: says(b'\x00', 'all that was sent is in the film'))
         recorder.stall()
         wait_until(lambda: says(b'\x01', '/run_recorder has stalled'))
         recorder.go_on()
         wait_until(lambda: says(b'\x00', 'all that was sent'))
         # One that has not heard the robot yet is not behind it.
-        silent = source.create_publisher(PoseProgress, 'atomizer/progress', topics.PROGRESS)
+        silent = source.create_publisher(PoseProgress, PROGRESS, topics.PROGRESS)
         wait_until(lambda: silent.get_subscription_count() == 2)
         behind = header('', int(MOTION.stamps_ns[99]) - 3_000_000_000)
         silent.publish(PoseProgress(header=behind, reporter='/robot'))

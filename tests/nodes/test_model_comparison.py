@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from paint_msgs.msg import ComparisonStats
 from std_srvs.srv import Trigger
-from visualization_msgs.msg import Marker, MarkerArray
 
 import paint_deposition as pd
 from nodes.cell import offline_um, parameters, two_passes, write_panel
@@ -14,7 +12,6 @@ from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.comparison.regions import radius_of_readings_m
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes import topics
 from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.node import OK, WARN
 from paint_deposition.report.colour_scales import BARE_RGB
@@ -22,6 +19,7 @@ from paint_deposition.report.colour_scales import BARE_RGB
 MOTION = two_passes()
 TRUTH = pd.DepositionModel().with_effect(effect_class('air_drift')(shift_down_m=0.08))
 SIGMA_UM = 0.2
+STATS = 'comparison/stats'
 
 
 @pytest.fixture
@@ -29,16 +27,13 @@ def readings(tmp_path):
     """A file of forty noisy readings of the true film, each place measured twice."""
     rng = np.random.default_rng(11)
     surface = pd.read_mesh(write_panel(tmp_path / 'panel.stl'), 1.0, 0.05)
-    places = np.column_stack(
-        [rng.uniform(-0.25, 0.25, 20), np.zeros(20), rng.uniform(-0.25, 0.25, 20)]
-    )
-    integrator = FilmIntegrator(surface.at(places), TRUTH, 'double')
+    x, z = rng.uniform(-0.25, 0.25, (2, 20))
+    integrator = FilmIntegrator(surface.at(np.stack([x, 0 * x, z], axis=1)), TRUTH, 'double')
     integrator.add(spray_path(MOTION)[0])
     lines = [['x_m', 'y_m', 'z_m', 'thickness_um', 'point', 'sigma_um']]
-    for number, (place, film) in enumerate(zip(places, integrator.gauge_um, strict=True)):
-        for _ in range(2):
-            reading = film + rng.normal(scale=SIGMA_UM)
-            lines.append([*(f'{c:.6f}' for c in place), f'{reading:.4f}', number, SIGMA_UM])
+    for row in np.repeat(np.arange(20), 2).tolist():
+        reading = integrator.gauge_um[row] + rng.normal(scale=SIGMA_UM)
+        lines.append([f'{x[row]:.6f}', 0, f'{z[row]:.6f}', f'{reading:.4f}', row, SIGMA_UM])
     path = tmp_path / 'readings.csv'
     write_table(path, lines)
     return path
@@ -57,38 +52,32 @@ def comparison(start, readings, tmp_path):
 @pytest.fixture
 def viewer(onlooker):
     """A node that looks at the comparison."""
-    kinds = {'stats': ComparisonStats, 'mesh': Marker, 'legend': MarkerArray}
-    return onlooker({f'comparison/{t}': (kind, topics.LATCHED) for t, kind in kinds.items()})
+    return onlooker(STATS, 'comparison/mesh', 'comparison/legend')
 
 
-def _true_model(tmp_path) -> str:
+@pytest.fixture
+def truth(tmp_path) -> str:
+    """The file of the true model."""
     pd.write_model(tmp_path / 'truth.yaml', TRUTH)
     return str(tmp_path / 'truth.yaml')
 
 
-def test_the_error_falls_to_the_noise_as_the_part_is_painted(
-    comparison, robot, viewer, wait_until, tmp_path
-):
-    node = comparison(model_file=_true_model(tmp_path))
+def test_the_error_falls_to_the_noise_while_painting(comparison, robot, viewer, wait_until, truth):
+    node = comparison(model_file=truth)
     source = robot(node)
-    wait_until(lambda: viewer.heard['comparison/stats'], what='the bare part')
+    wait_until(lambda: viewer.heard[STATS], what='the bare part')
     errors = []
     for start in range(0, len(MOTION), 200):
-        rows = slice(start, start + 200)
-        source.send(MOTION, rows)
-        newest = MOTION.stamps_ns[rows][-1]
-        wait_until(
-            lambda newest=newest: viewer.shows(
-                'comparison/stats', lambda m: stamp_ns(m.header) == newest
-            )
-        )
-        errors.append(viewer.newest('comparison/stats').rmse_um)
-    before_any = viewer.decoded('comparison/stats', 0)
+        source.send(MOTION, slice(start, start + 200))
+        newest = MOTION.stamps_ns[start + 199]
+        wait_until(lambda n=newest: viewer.shows(STATS, lambda m: stamp_ns(m.header) == n))
+        errors.append(viewer.newest(STATS).rmse_um)
+    before_any = viewer.decoded(STATS, 0)
     measured = node.readings.thickness_um
     assert before_any.rmse_um == pytest.approx(np.sqrt(np.mean(measured**2)))
     assert before_any.readings_painted == 0
     assert before_any.rmse_um > errors[0] > errors[1] > errors[2]
-    stats = viewer.newest('comparison/stats')
+    stats = viewer.newest(STATS)
     assert (stats.model, stats.readings, stats.readings_painted) == ('truth.yaml', 40, 40)
     assert stats.rmse_um == pytest.approx(SIGMA_UM, rel=0.3)
     assert stats.chi_square_per_reading == pytest.approx(1.0, abs=0.6)
@@ -96,13 +85,8 @@ def test_the_error_falls_to_the_noise_as_the_part_is_painted(
     assert abs(stats.worst_residual_um) < 5 * SIGMA_UM
 
 
-def test_a_better_model_set_at_run_time_lowers_the_error(
-    comparison, robot, viewer, call, wait_until, tmp_path
-):
-    """Predictions are those of an offline run in double precision, and a service says it.
-
-    The surface is coloured around readings and grey elsewhere.
-    """
+def test_a_better_model_lowers_the_error(comparison, robot, viewer, call, wait_until, truth):
+    """Predictions are those of an offline run; a service and colours around readings say it."""
     node = comparison(color_max_um=5.0)
     robot(node).send(MOTION)
     wait_until(lambda: node.film.counts.received == len(MOTION))
@@ -121,8 +105,8 @@ def test_a_better_model_set_at_run_time_lowers_the_error(
     assert not grey[distance < radius_m - 1e-4].any()
     texts = [m.text for m in viewer.newest('comparison/legend').markers if m.text]
     assert (texts[0], texts[-1]) == ('-5 µm', '5 µm')
-    wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.readings_painted == 40))
-    without = viewer.newest('comparison/stats')
+    wait_until(lambda: viewer.shows(STATS, lambda m: m.readings_painted == 40))
+    without = viewer.newest(STATS)
     assert without.model == 'default model'
     assert without.rmse_um > 3 * SIGMA_UM
     offline = offline_um(node, MOTION, precision='double')
@@ -130,14 +114,14 @@ def test_a_better_model_set_at_run_time_lowers_the_error(
     assert np.array_equal(found.predicted_um, np.repeat(offline[:20], 2))
     readings_um = node.readings.thickness_um
     assert np.allclose(found.predicted_um + found.residual_um, readings_um, rtol=1e-14)
-    answer = call(viewer, Trigger, '/model_comparison/compare', Trigger.Request())
+    answer = call(viewer, Trigger, '/model_comparison/compare')
     assert answer.success
     assert '\n' not in answer.message
     assert f'rms {found.rmse_um:.2f} µm' in answer.message
     assert '40 readings, 40 where' in answer.message
-    node.set_parameters(parameters(model_file=_true_model(tmp_path)))
-    wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.rmse_um < 1.5 * SIGMA_UM))
-    assert viewer.newest('comparison/stats').model == 'truth.yaml'
+    node.set_parameters(parameters(model_file=truth))
+    wait_until(lambda: viewer.shows(STATS, lambda m: m.rmse_um < 1.5 * SIGMA_UM))
+    assert viewer.newest(STATS).model == 'truth.yaml'
 
 
 def test_a_zero_is_warned_of_once_film_is_expected_there(comparison, robot, readings, wait_until):
@@ -178,8 +162,8 @@ def test_readings_with_normals_on_a_sheet_that_is_wound_inward(
     source.send(MOTION)
     painted(node)
     if toward_gun:
-        assert np.array_equal(node.film.snapshot().film_um,
-                              offline_um(node, MOTION, precision='double'))  # fmt: skip
+        offline = offline_um(node, MOTION, precision='double')
+        assert np.array_equal(node.film.snapshot().film_um, offline)
         assert node.residuals().painted.all()
     else:
         told = 'the gun paints the other side of the part'

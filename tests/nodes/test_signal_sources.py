@@ -1,29 +1,29 @@
 """Gun signals over real sockets: an RWS server as ABB describes it, and a server of asyncua."""
 
-import asyncio
 import socket
 import threading
 import time
 from contextlib import contextmanager
 from datetime import datetime, timedelta, timezone
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from urllib.parse import parse_qs
 
 import numpy as np
 import pytest
-from asyncua import Server, ua
+from asyncua import ua
 from asyncua.crypto.cert_gen import generate_private_key, generate_self_signed_app_certificate
 from asyncua.crypto.permission_rules import User, UserRole
+from asyncua.sync import Server
 from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from cryptography.x509.oid import ExtendedKeyUsageOID
 from paint_msgs.msg import AtomizerState
 from websockets.sync.server import serve
 
-from nodes.cell import parameters
+from nodes.cell import free_port, parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.nodes.atomizer_source import LATCHED_STATES
 from paint_deposition.nodes.controllers import OpcuaSource, RwsSource
 
 GUN, FLOW = 'EtherNetIP/Gun/doGun', 'EtherNetIP/Gun/aoFlow'
@@ -102,62 +102,38 @@ class Controller:
             events.shutdown()
 
 
-class Supply:
-    """A server of asyncua with the gun's variables below Objects."""
+class OneUser:
+    def get_user(self, iserver, username=None, password=None, certificate=None):
+        known = (username, password) == ('cell', 'secret')
+        return User(role=UserRole.User) if known else None
 
-    NAMES = ('Open', 'Voltage')
 
-    def __init__(self, address: str, secured: dict | None = None) -> None:
-        self._address, self._secured = address, secured
-        self._loop = asyncio.new_event_loop()
-        self._nodes: dict = {}
+@contextmanager
+def supply(address: str, *secured: Path):
+    """A server with the gun's variables below Objects, secured by a certificate and a key."""
+    server = Server()
+    if secured:
+        server.aio_obj.iserver.user_manager = OneUser()
+        server.set_security_policy([ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt])
+        server.load_certificate(str(secured[0]))
+        server.load_private_key(str(secured[1]))
+    server.set_endpoint(address)
+    space = server.register_namespace('urn:supply')
+    gun = server.nodes.objects.add_object(space, 'Gun')
+    with server:
+        yield {
+            name: gun.add_variable(f'ns={space};s=Gun.{name}', f'{space}:{name}', value)
+            for name, value in (('Open', False), ('Voltage', 0.0))
+        }
 
-    @contextmanager
-    def running(self):
-        thread = threading.Thread(target=self._loop.run_forever, daemon=True)
-        thread.start()
-        server = self._wait(self._start())
-        try:
-            yield self
-        finally:
-            self._wait(self._end(server))
-            self._loop.call_soon_threadsafe(self._loop.stop)
-            thread.join()
 
-    async def _start(self) -> Server:
-        server = Server(user_manager=_OneUser() if self._secured else None)
-        await server.init()
-        if self._secured:
-            server.set_security_policy([ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt])
-            await server.load_certificate(str(self._secured['certificate']))
-            await server.load_private_key(str(self._secured['private_key']))
-        server.set_endpoint(self._address)
-        space = await server.register_namespace('urn:supply')
-        gun = await server.nodes.objects.add_object(space, 'Gun')
-        for name, value in zip(self.NAMES, (False, 0.0), strict=True):
-            called = f'ns={space};s=Gun.{name}', f'{space}:{name}'
-            self._nodes[name] = await gun.add_variable(*called, value)
-        await server.start()
-        return server
-
-    async def _end(self, server: Server) -> None:
-        await server.stop()
-        left = asyncio.all_tasks() - {asyncio.current_task()}
-        for task in left:
-            task.cancel()
-        await asyncio.gather(*left, return_exceptions=True)
-
-    def set(self, name: str, value, at: datetime, **status: ua.StatusCode) -> None:
-        data = ua.DataValue(ua.Variant(value), SourceTimestamp=at, **status)
-        self._wait(self._nodes[name].write_value(data))
-
-    def _wait(self, work):
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result(30.0)
+def write(variable, value, at: datetime, **status: ua.StatusCode) -> None:
+    variable.write_value(ua.DataValue(ua.Variant(value), SourceTimestamp=at, **status))
 
 
 @pytest.fixture
 def states(onlooker):
-    return onlooker({'atomizer/state': (AtomizerState, LATCHED_STATES)})
+    return onlooker('atomizer/state')
 
 
 def test_signals_of_a_controller_switch_the_gun(start, states, wait_until):
@@ -180,10 +156,10 @@ def test_signals_of_a_controller_switch_the_gun(start, states, wait_until):
         assert np.isnan(opened.voltage_kv)
         assert 0.05e9 <= time.time_ns() - stamp_ns(opened.header) < 60e9
         wait_until(lambda: states.reports('rws_source: signals', 'following the signals'))
-        controller.socket.close()
+        broken = controller.socket
+        broken.close()
         wait_until(lambda: states.reports('rws_source: signals', url, b'\x02'), what='the break')
-        controller.socket = None
-        wait_until(lambda: controller.socket is not None, what='another connection')
+        wait_until(lambda: controller.socket is not broken, what='another connection')
         assert controller.sessions == 1
         node.close()
         wait_until(lambda: controller.sessions == 0, what='the end of the session')
@@ -198,76 +174,57 @@ def test_the_cookie_of_a_controller_goes_to_no_other_host(start, states, wait_un
         assert controller.cookie == ''
 
 
-class _OneUser:
-    def get_user(self, iserver, username=None, password=None, certificate=None):
-        known = (username, password) == ('cell', 'secret')
-        return User(role=UserRole.User) if known else None
-
-
-def test_a_supply_may_ask_for_a_user_and_encryption(
-    start, states, wait_until, free_port, tmp_path, monkeypatch
-):
+def test_a_supply_may_want_a_user_and_encryption(start, states, wait_until, tmp_path, monkeypatch):
     """The password is in no parameter and in no diagnostics."""
-    files = {
-        'certificate': tmp_path / 'certificate.der', 'private_key': tmp_path / 'private_key.pem',
-    }  # fmt: skip
+    certificate, private_key = tmp_path / 'certificate.der', tmp_path / 'private_key.pem'
     key = generate_private_key()
     pem = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-    files['private_key'].write_bytes(pem)
+    private_key.write_bytes(pem)
     names, host = {'commonName': 'cell'}, socket.gethostname()
     made = generate_self_signed_app_certificate(
         key, 'urn:cell', names, [x509.DNSName(host)], [ExtendedKeyUsageOID.CLIENT_AUTH]
     )
-    files['certificate'].write_bytes(made.public_bytes(Encoding.DER))
+    certificate.write_bytes(made.public_bytes(Encoding.DER))
     monkeypatch.setenv('OPCUA_PASSWORD', 'secret')
-    address = f'opc.tcp://127.0.0.1:{free_port}'
-    with Supply(address, files).running():
+    address = f'opc.tcp://127.0.0.1:{free_port(socket.SOCK_STREAM)}'
+    with supply(address, certificate, private_key):
         node = start(
             OpcuaSource, url=address, trigger='ns=2;s=Gun.Open', user='cell',
-            security_policy='Basic256Sha256', certificate_file=str(files['certificate']),
-            private_key_file=str(files['private_key']),
+            security_policy='Basic256Sha256', certificate_file=str(certificate),
+            private_key_file=str(private_key),
         )  # fmt: skip
         wait_until(lambda: len(states.heard['atomizer/state']) == 1, what='the first state')
         assert 'secret' not in str(node.values)
 
 
-def test_variables_of_a_material_supply_count_from_their_own_time(
-    start, states, wait_until, free_port
-):
-    address = f'opc.tcp://127.0.0.1:{free_port}'
-    with Supply(address).running() as supply:
+def test_variables_of_a_material_supply_count_from_their_own_time(start, states, wait_until):
+    address = f'opc.tcp://127.0.0.1:{free_port(socket.SOCK_STREAM)}'
+    with supply(address) as gun:
         values = {'trigger': 'ns=2;s=Gun.Open', 'voltage': '2:Gun/2:Voltage'}
         start(OpcuaSource, url=address, **values)
         wait_until(lambda: len(states.heard['atomizer/state']) == 1, what='the first state')
         # Behind the state before, or the opening would count from that.
         first_s = 1e-9 * stamp_ns(states.newest('atomizer/state').header)
         at = datetime.fromtimestamp(first_s, timezone.utc) + timedelta(milliseconds=1)
-        supply.set('Open', True, at)
+        write(gun['Open'], True, at)
         wait_until(lambda: len(states.heard['atomizer/state']) == 2, what='the opening')
         opened = states.newest('atomizer/state')
         assert (opened.spraying, opened.flow, opened.voltage_kv) == (True, 1.0, 0.0)
         assert stamp_ns(opened.header) == pytest.approx(1e9 * at.timestamp(), abs=2e3)
-        supply.set('Voltage', 62.0, at - timedelta(seconds=30))
+        write(gun['Voltage'], 62.0, at - timedelta(seconds=30))
         told = 'Voltage arrives 30'
         wait_until(lambda: states.reports('opcua_source: signals', told, b'\x02'), what=told)
         assert states.newest('atomizer/state').voltage_kv == 62.0
         # Nothing that is no value goes unnoticed, nor is taken for one.
         heard = len(states.heard['atomizer/state'])
         bad = ua.StatusCode(ua.StatusCodes.BadSensorFailure)
-        supply.set('Voltage', None, datetime.now(timezone.utc), StatusCode=bad)
+        write(gun['Voltage'], None, datetime.now(timezone.utc), StatusCode=bad)
         told = 'Voltage is BadSensorFailure; the gun stays as it was'
         wait_until(lambda: states.reports('opcua_source: signals', told, b'\x02'), what=told)
-        supply.set('Open', False, datetime.now(timezone.utc))
+        write(gun['Open'], False, datetime.now(timezone.utc))
         wait_until(lambda: len(states.heard['atomizer/state']) > heard, what='the closing')
         assert states.newest('atomizer/state').voltage_kv == 62.0
         wait_until(lambda: states.reports('opcua_source: signals', told, b'\x02'), what=told)
-
-
-@pytest.fixture
-def free_port():
-    with socket.socket() as free:
-        free.bind(('127.0.0.1', 0))
-        return free.getsockname()[1]
 
 
 def test_values_from_before_a_connection_are_not_called_late(ros_context):
@@ -313,14 +270,11 @@ def test_a_library_that_is_missing_ends_the_node(start, monkeypatch):
         start(OpcuaSource, trigger='gun')
 
 
-@pytest.mark.parametrize(
-    ('values', 'words'),
-    [
-        ({}, 'trigger is empty'),
-        ({'trigger': 'a', 'flow': 'a'}, 'a signal is named twice: a a'),
-        ({'trigger': 'a', 'url': 'http://me:secret@127.0.0.1:9'}, 'url holds a login, .*RWS_PASS'),
-    ],
-)
+@pytest.mark.parametrize(('values', 'words'), [
+    ({}, 'trigger is empty'),
+    ({'trigger': 'a', 'flow': 'a'}, 'a signal is named twice: a a'),
+    ({'trigger': 'a', 'url': 'http://me:secret@127.0.0.1:9'}, 'url holds a login, .*RWS_PASS'),
+])  # fmt: skip
 def test_signals_that_are_not_named_are_refused(start, values, words):
     with pytest.raises(PaintError, match=words) as refused:
         start(RwsSource, **values)

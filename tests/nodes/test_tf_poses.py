@@ -4,8 +4,6 @@ import importlib.util
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped
-from rclpy.qos import QoSProfile
 from scipy.spatial.transform import Rotation
 
 from nodes.cell import START_NS, Broadcaster, parameters
@@ -24,7 +22,7 @@ TCP = [0.0, 0.02, 0.15, *Rotation.from_euler('y', 25.0, degrees=True).as_quat()]
 
 @pytest.fixture
 def viewer(onlooker):
-    return onlooker({'atomizer/pose': (PoseStamped, QoSProfile(depth=500))})
+    return onlooker('atomizer/pose')
 
 
 @pytest.fixture
@@ -64,8 +62,7 @@ def told(viewer) -> str:
 
 
 @needs_tf
-def test_poses_are_those_of_the_bell_at_the_stamps_of_the_transforms(broadcaster, viewer,
-                                                                     wait_until):  # fmt: skip
+def test_poses_of_the_bell_have_the_stamps_of_transforms(broadcaster, viewer, wait_until):
     """A rail that tells its place at a fifth of the arm's rate, and late."""
     broadcaster.send(START_NS, static=True, flange_to_tool0=FLANGE)
     stamps = [START_NS + STEP_NS * row for row in range(51)]

@@ -48,9 +48,8 @@ def test_browsers_see_the_film_of_the_simulator(
 
     def shows(tab, film_um) -> bool:
         shown = np.array(tab.evaluate('Array.from(page.view.film ?? [])'))
-        return len(shown) == len(film_um) and np.allclose(
-            shown, film_um, rtol=2**-11, atol=STEP_UM / 2
-        )
+        within = {'rtol': 2**-11, 'atol': STEP_UM / 2}
+        return len(shown) == len(film_um) and np.allclose(shown, film_um, **within)
 
     with Chromium(tmp_path / 'browser') as browser:
         early = browser.tab(viewer.page.url)
@@ -96,9 +95,7 @@ def test_browsers_see_the_film_of_the_simulator(
         assert early.evaluate('page.view.segments') == 0
 
 
-def test_film_on_another_mesh_is_not_shown(
-    simulator, web_view, onlooker, robot, painted, wait_until
-):
+def test_another_mesh_shows_no_film(simulator, web_view, onlooker, robot, painted, wait_until):
     painter, viewer, looker = simulator(), web_view(max_edge_length_m=0.1), onlooker()
     robot(painter, viewer).send(two_passes(60))
     painted(painter, 60)

@@ -20,11 +20,9 @@ def cell(ros_context, spin):
 def publisher(cell, wait_until):
     """`publisher(type, topic, profile)`: a publisher that the recorder has subscribed to."""
 
-    def publisher(kind, topic: str, profile, subscribers: int = 1):
+    def publisher(kind, topic: str, profile):
         made = cell.create_publisher(kind, topic, profile)
-        wait_until(
-            lambda: made.get_subscription_count() >= subscribers, what=f'a subscriber on {topic}'
-        )
+        wait_until(made.get_subscription_count, what=f'a subscriber on {topic}')
         return made
 
     return publisher
@@ -33,7 +31,7 @@ def publisher(cell, wait_until):
 @pytest.fixture
 def listen(ros_context, spin):
     """`listen(name)`: a node that hears the poses, running."""
-    from nodes.bags.listener import Listener
+    from nodes.bags.runs import Listener
 
     def listen(name='listener', reports=True, namespace='') -> Listener:
         listener = Listener(ros_context, name, reports, namespace)

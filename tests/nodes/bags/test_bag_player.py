@@ -1,18 +1,24 @@
-"""Replay over real DDS: the recorded bytes in the recorded order, whatever the speed."""
+"""Replay over real DDS: the recorded bytes in the recorded order and their time, at any speed."""
+
+import threading
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
 from rclpy.serialization import deserialize_message
+from rclpy.time import Time
 from std_srvs.srv import Trigger
 
 from files.recorded import START_NS, STATE_TYPES, Messages, pose_entries, straight_pass, write_bag
-from nodes.bags.listener import recorded
+from nodes.bags.runs import recorded
 from nodes.processes import NodeProcess
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.messages import stamp_ns
+from paint_deposition.nodes.bags.pace import LOST_TIMEOUT_S, NO_REPORT_TIMEOUT_S, FlowControl
 from robot_arm import JOINTS, URDF, sweep
 
 
@@ -35,20 +41,29 @@ def test_the_recorded_bytes_arrive_in_order(play, listen, wait_until, onlooker, 
     assert (player.poses_published, player.states_published) == (700, 2)
 
 
-def test_a_ros1_bag_is_replayed_as_ros2_messages(play, listen, wait_until, tmp_path):
+@pytest.fixture
+def replayed(play, listen, wait_until):
+    """`replayed(bag, **parameters)`: who has heard all of a replay without pauses."""
+
+    def replayed(bag, **chosen):
+        listener = listen()
+        wait_until(play(bag, rate=0.0, **chosen).finished.done, what='the end of the replay')
+        return listener
+
+    return replayed
+
+
+def test_a_ros1_bag_is_replayed_as_ros2_messages(replayed, tmp_path):
     written = straight_pass(40, triggers=False)
     bag = write_bag(tmp_path / 'old.bag', pose_entries(written, ros1=True), 'ros1')
-    listener = listen()
-    player = play(bag, rate=0.0)
-    wait_until(player.finished.done, what='the end of the replay')
-    poses = [deserialize_message(cdr, PoseStamped) for cdr in listener.poses]
+    poses = [deserialize_message(cdr, PoseStamped) for cdr in replayed(bag).poses]
     assert [stamp_ns(pose.header) for pose in poses] == written.stamps_ns.tolist()
     assert [pose.pose.position.x for pose in poses] == written.positions_m[:, 0].tolist()
     assert {pose.header.frame_id for pose in poses} == {'door'}
 
 
 @pytest.mark.parametrize('kind', ['tf', 'urdf'])
-def test_a_bag_without_poses_is_replayed(kind, play, listen, wait_until, tmp_path):
+def test_a_bag_without_poses_is_replayed(kind, play, replayed, tmp_path):
     """From transforms or joint states of a robot, with the trigger, as `paint simulate` does."""
     messages, entries = Messages(), []
     stamps_ns = START_NS + 20_000_000 * np.arange(40)
@@ -65,9 +80,7 @@ def test_a_bag_without_poses_is_replayed(kind, play, listen, wait_until, tmp_pat
     with pytest.raises(RecordingError, match=remedy):
         play(bag)
     given = {'tf': ['base', 'tool0']} if kind == 'tf' else {'urdf': str(URDF)}
-    listener = listen()
-    player = play(bag, rate=0.0, state_topic='/gun', **given)
-    wait_until(player.finished.done, what='the end of the replay')
+    listener = replayed(bag, state_topic='/gun', **given)
     poses = [deserialize_message(cdr, PoseStamped) for cdr in listener.poses]
     offline = read_recording(bag, state_topic='/gun', **given)
     assert [stamp_ns(pose.header) for pose in poses] == offline.stamps_ns.tolist()
@@ -77,7 +90,7 @@ def test_a_bag_without_poses_is_replayed(kind, play, listen, wait_until, tmp_pat
     assert [stamp_ns(s.header) for s in listener.states] == offline.trigger_stamps_ns.tolist()
 
 
-def test_states_of_another_version_keep_what_they_say(play, listen, wait_until, tmp_path):
+def test_states_of_another_version_keep_what_they_say(replayed, tmp_path):
     """The bag's own definition lacks the voltage; the message of today has it."""
     (kind,) = STATE_TYPES
     messages = Messages(state_types={kind: STATE_TYPES[kind].replace('float64 voltage_kv\n', '')})
@@ -86,41 +99,27 @@ def test_states_of_another_version_keep_what_they_say(play, listen, wait_until, 
     entries = pose_entries(straight_pass(20, triggers=False))
     entries.insert(0, ('/state', START_NS - 5, state))
     bag = write_bag(tmp_path / 'older', entries, messages=messages)
-    listener = listen()
-    player = play(bag, rate=0.0, state_topic='state')
-    wait_until(player.finished.done, what='the end of the replay')
-    (taken,) = listener.states
+    (taken,) = replayed(bag, state_topic='state').states
     assert stamp_ns(taken.header) == START_NS - 9
     assert (taken.spraying, taken.flow, taken.shaping_air_l_per_min) == (True, 0.7, 250.0)
     assert np.isnan(taken.voltage_kv)
     assert taken.brush == 0
 
 
-def test_a_bool_of_another_clock_is_refused(play, tmp_path):
-    entries = pose_entries(straight_pass(20, triggers=False), delay_ns=10**10)
-    entries.insert(0, ('/gun', START_NS + 10**10, Messages().trigger(True)))
-    bag = write_bag(tmp_path / 'other_clock', entries)
-    with pytest.raises(RecordingError, match='10 s off its own stamps'):
-        play(bag, state_topic='/gun')
-
-
 def test_pause_and_resume(onlooker, play, listen, call, wait_until, pass_bag):
     caller, listener = onlooker(), listen()
     player = play(pass_bag, rate=1.0, start_paused=True)
-
-    def tell(name: str) -> Trigger.Response:
-        return call(caller, Trigger, f'bag_player/{name}', Trigger.Request())
-
-    assert tell('resume').message == 'resumed'
-    assert not tell('resume').success
+    tell = partial(call, caller, Trigger)
+    assert tell('bag_player/resume').message == 'resumed'
+    assert not tell('bag_player/resume').success
     wait_until(lambda: len(listener.poses) > 20, what='poses')
-    assert tell('pause').success
-    assert tell('pause').message == 'already paused'
+    assert tell('bag_player/pause').success
+    assert tell('bag_player/pause').message == 'already paused'
     paused_at = player.poses_published
     caller.heard['/diagnostics'].clear()
     wait_until(lambda: caller.reports('bag_player: replay', 'paused'))
     assert player.poses_published - paused_at <= 1
-    assert tell('resume').success
+    assert tell('bag_player/resume').success
     wait_until(lambda: len(listener.poses) > paused_at + 20, what='more poses')
     assert listener.poses == recorded(pass_bag)[: len(listener.poses)]
 
@@ -134,12 +133,16 @@ def test_a_loop_starts_over(play, listen, wait_until, tmp_path):
     assert not player.finished.done()
 
 
-def test_bad_input_is_reported_at_the_start(play, pass_bag):
+def test_bad_input_is_reported_at_the_start(play, pass_bag, tmp_path):
+    entries = pose_entries(straight_pass(20, triggers=False), delay_ns=10**10)
+    entries.insert(0, ('/gun', START_NS + 10**10, Messages().trigger(True)))
+    off = str(write_bag(tmp_path / 'other_clock', entries))
     for values, says in (
         ({'bag': ''}, 'bag is empty: give the path of a recording'),
         ({'bag': '/nowhere'}, '/nowhere: no such file; give a bag'),
         ({'pose_topic': 'atomizer/pos'}, 'its PoseStamped topics: /atomizer/pose'),
         ({'state_topic': '/gun'}, 'its state topics: /atomizer/state'),
+        ({'bag': off, 'state_topic': '/gun'}, '10 s off its own stamps'),
     ):
         with pytest.raises((PaintError, RecordingError), match=says):
             play(**{'bag': str(pass_bag)} | values)
@@ -149,18 +152,14 @@ def test_the_player_stays_within_its_window(play, listen, wait_until, pass_bag):
     """A subscriber that takes poses and never says so gets a window of them, and no more."""
     listener = listen(reports=False)  # it has the publisher, and is silent
     player = play(pass_bag, rate=0.0, window=60)
-    wait_until(lambda: player.poses_published == 60, what='a window of poses')
-    wait_until(lambda: len(listener.poses) == 60, what='the poses')
+    wait_until(lambda: len(listener.poses) == 60, what='a window of poses')
     assert player.poses_published == 60
     listener.report()
     wait_until(lambda: player.poses_published == 120, what='the next window')
     while not player.finished.done():
         taken = len(listener.poses)
         listener.report()
-        wait_until(
-            lambda taken=taken: len(listener.poses) > taken or player.finished.done(),
-            what='more poses',
-        )
+        wait_until(lambda n=taken: len(listener.poses) > n or player.finished.done())
     assert listener.poses == recorded(pass_bag)
 
 
@@ -184,3 +183,107 @@ def test_a_bag_that_breaks_off_later_ends_the_process(ros_domain, listen, wait_u
         wait_until(lambda: process.exit_code is not None, what='the end')
         assert process.exit_code == 2
         assert f'run: paint recover {bag}' in process.err
+
+
+def ticks(viewer) -> list[int]:
+    """The times [ns] on /clock."""
+    return [Time.from_msg(message.clock).nanoseconds for message in viewer.all('/clock')]
+
+
+@pytest.fixture
+def watch(onlooker, wait_until):
+    """`watch()`: who has heard the clock."""
+
+    def watch():
+        viewer = onlooker('/clock')
+        wait_until(lambda: len(viewer.heard['/clock']) > 5, what='the clock')
+        return viewer
+
+    return watch
+
+
+def test_the_clock_runs_on_through_a_gap(play, listen, onlooker, wait_until, tmp_path):
+    written = straight_pass(60, triggers=False)
+    stamps_ns = written.stamps_ns.copy()
+    stamps_ns[30:] += 2 * 10**9
+    bag = write_pose_bag(tmp_path / 'pass', replace(written, stamps_ns=stamps_ns))
+    viewer = onlooker('/clock')
+    listen()
+    player = play(bag, rate=2.0)
+    wait_until(player.finished.done, what='the end of the replay')
+    bag_ns = np.array(ticks(viewer))
+    assert (np.diff(bag_ns) >= 0).all()
+    assert bag_ns[0] == stamps_ns[0]
+    assert bag_ns[-1] >= stamps_ns[-1]
+    in_gap = (bag_ns > stamps_ns[29]) & (bag_ns < stamps_ns[30])
+    assert len(np.unique(bag_ns[in_gap])) > 2
+
+
+@pytest.mark.parametrize('rate', [1.0, 0.0])
+def test_the_clock_stands_meanwhile(play, listen, watch, call, wait_until, pass_bag, rate):
+    """Before the start and while paused, also for who comes late; it runs with the first pose."""
+    player = play(pass_bag, rate=rate, window=50)
+    viewer = watch()
+    tell = partial(call, viewer, Trigger)
+    early = ticks(viewer) + ticks(watch())
+    assert player.poses_published == 0
+    assert set(early) == {straight_pass(700).stamps_ns[0]}
+    listen(reports=None if rate else False)
+    wait_until(lambda: player.poses_published >= 20, what='poses')
+    assert tell('bag_player/pause').success
+    (paused_ns,) = set(ticks(watch()))
+    assert tell('bag_player/resume').success
+    if rate:
+        wait_until(lambda: ticks(viewer)[-1] > paused_ns + 10**8, what='the time of the replay')
+        assert ticks(viewer) == sorted(ticks(viewer))
+
+
+@pytest.fixture
+def window(cell):
+    """The control of a publisher of poses."""
+    publisher = cell.create_publisher(PoseStamped, 'atomizer/pose', 10)
+    return FlowControl(cell, publisher, 200, threading.Event())
+
+
+def published(window: FlowControl, stamps, now_s: float = 0.0) -> None:
+    for stamp in stamps:
+        window.add_sent(stamp, now_s)
+
+
+def test_lost_poses_are_not_waited_for_while_reports_arrive(window):
+    window.set_subscribers(['simulator'], 0.0)
+    published(window, range(10))
+    now_s = 0.0
+    while now_s < LOST_TIMEOUT_S:
+        window.report('simulator', 6, now_s)
+        assert window.lag(now_s) == {'simulator': 3}
+        now_s += 0.2
+    window.report('simulator', 6, now_s + 0.2)
+    assert window.lag(now_s + 0.2) == {}
+    assert window.subscribers['simulator'].lost == 3
+
+
+def test_a_subscriber_that_never_reports_is_not_waited_for(window):
+    """The others are waited for as before."""
+    window.set_subscribers(['mute', 'simulator'], 0.0)
+    published(window, range(10))
+    window.report('simulator', 7, 0.0)
+    assert window.lag(NO_REPORT_TIMEOUT_S - 0.1) == {'mute': 10, 'simulator': 2}
+    assert window.lag(NO_REPORT_TIMEOUT_S + 0.1) == {'simulator': 2}
+    assert window.subscribers['mute'].never_reported
+    published(window, range(10, 25), now_s=40.0)
+    window.report('simulator', 24, 40.0)
+    window.report('mute', 21, 40.0)
+    assert window.lag(40.0) == {'mute': 3}
+
+
+def test_only_present_subscribers_are_waited_for(window):
+    window.set_subscribers(['doomed', 'survivor'], 0.0)
+    published(window, range(10))
+    window.report('survivor', 9, 0.0)
+    assert window.lag(0.0) == {'doomed': 10}
+    window.set_subscribers(['late', 'survivor'], 0.0)
+    assert window.lag(0.0) == {}
+    published(window, range(10, 15))
+    window.report('survivor', 14, 0.0)
+    assert window.lag(0.0) == {'late': 5}

@@ -24,15 +24,24 @@ def sent(topic, stamp_s, sent_s, **gun):
     return topic, serialize_message(message), sent_s * S, sent_s * S
 
 
+def remembered(*messages) -> InitialMessages:
+    memory = InitialMessages({'': (POSE, STATE)}, '/part_pose')
+    for message in messages:
+        memory.add(*message)
+    return memory
+
+
+def states_of(begun) -> list[AtomizerState]:
+    return [deserialize_message(m.cdr, AtomizerState) for m in begun if m.topic == STATE]
+
+
 def test_a_run_begins_with_what_its_part_carries_over_and_what_was_sent_since():
     """Whatever else the recorder has heard; it adds what moves no film."""
-    memory = InitialMessages({'': (POSE, STATE)}, '/part_pose')
-    for message in [
+    memory = remembered(
         sent(STATE, 0, 1, flow=0.5, brush=2, voltage_kv=60.0), sent(POSE, 1, 2),
         sent(STATE, 2, 3, flow=1.0, brush=9), sent(POSE, 2, 4), sent(STATE, 3, 5, flow=0.0),
         sent(POSE, 3, 6),
-    ]:  # fmt: skip
-        memory.add(*message)
+    )  # fmt: skip
     carried = [state_message('', TriggerChange(START_NS, 0.5, 2)),
                state_message('', TriggerChange(START_NS + 4 * S, 1.0, 1))]  # fmt: skip
     part = Part(last_sent_ns=4 * S, guns=[''], states_sent_ns=[4 * S], states=carried)
@@ -42,7 +51,7 @@ def test_a_run_begins_with_what_its_part_carries_over_and_what_was_sent_since():
     begun = memory.begin_run(7 * S)
     assert [message.topic for message in begun] == [STATE, STATE, STATE, POSE]
     assert [message.log_time_ns for message in begun] == [6 * S] * 4
-    states = [deserialize_message(message.cdr, AtomizerState) for message in begun[:3]]
+    states = states_of(begun)
     told = [(stamp_ns(s.header), s.spraying, s.flow, s.brush) for s in states]
     assert told == [
         (START_NS, True, 0.5, 2), (START_NS + 4 * S, True, 1.0, 1),
@@ -52,27 +61,23 @@ def test_a_run_begins_with_what_its_part_carries_over_and_what_was_sent_since():
 
 
 def test_without_a_part_a_run_begins_with_the_states_in_force_at_the_last_pose_before_it():
-    memory = InitialMessages({'': (POSE, STATE)}, '/part_pose')
-    for message in [
+    memory = remembered(
         sent(STATE, 0, 1, flow=1.0), sent(STATE, 1, 2, flow=0.5), sent(STATE, 2, 3, flow=inf),
         sent(POSE, 3, 4), sent(STATE, 4, 5, flow=0.0),
-    ]:  # fmt: skip
-        memory.add(*message)
+    )  # fmt: skip
     memory.end_motion()
-    states = [deserialize_message(m.cdr, AtomizerState) for m in memory.begin_run(6 * S)]
-    assert [state.flow for state in states] == [0.5, 0.0]
+    begun = memory.begin_run(6 * S)
+    assert {message.topic for message in begun} == {STATE}
+    assert [state.flow for state in states_of(begun)] == [0.5, 0.0]
 
 
 def test_of_two_states_with_one_stamp_the_one_sent_later_holds_whichever_comes_first():
-    memory = InitialMessages({'': (POSE, STATE)}, '/part_pose')
-    for sent_s, flow in ((2, 0.0), (1, 1.0)):
-        memory.add(*sent(STATE, 0, sent_s, flow=flow))
-    states = [deserialize_message(m.cdr, AtomizerState) for m in memory.begin_run(3)]
-    assert [state.flow for state in states] == [1.0, 0.0]
+    begun = remembered(sent(STATE, 0, 2, flow=0.0), sent(STATE, 0, 1, flow=1.0)).begin_run(3)
+    assert [state.flow for state in states_of(begun)] == [1.0, 0.0]
 
 
 def test_a_static_transform_that_is_sent_again_takes_the_place_of_the_former():
-    memory, messages = InitialMessages({'': (POSE, STATE)}, '/part_pose'), Messages()
+    memory, messages = remembered(), Messages()
     for sent_s, (child, x) in enumerate([('a', 1.0), ('b', 2.0), ('a', 3.0)]):
         cdr = messages.serialised(messages.transforms((0, 'world', child, [x, 0, 0, 0, 0, 0, 1])))
         memory.add('/tf_static', bytes(cdr), sent_s * S, sent_s * S)

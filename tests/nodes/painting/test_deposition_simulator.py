@@ -1,24 +1,19 @@
 """The live film over real DDS."""
 
 import time
-from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import trimesh
-from paint_msgs.msg import ThicknessField
-from scipy.spatial.transform import Rotation
-from visualization_msgs.msg import Marker
 
-from nodes.cell import two_passes
+from nodes.cell import offline_um, turned, two_passes
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes import topics
 from paint_deposition.nodes.painting.film_display import ACKNOWLEDGE_TIMEOUT_S
 from paint_deposition.nodes.topics import header_stamp_ns
 from paint_deposition.part.surface import toward_the_guns
@@ -58,12 +53,7 @@ def test_the_gun_decides_which_side_of_a_solid_is_outward(simulator, robot, pain
     write_model(tmp_path / 'air.yaml', model)
     plate = tmp_path / 'plate.stl'
     trimesh.creation.box((0.012, 0.8, 0.8)).export(plate)
-    quarter = Rotation.from_euler('z', 90.0, degrees=True)
-    motion = replace(
-        MOTION,
-        positions_m=quarter.apply(MOTION.positions_m),
-        quaternions_xyzw=(quarter * Rotation.from_quat(MOTION.quaternions_xyzw)).as_quat(),
-    )
+    motion = turned(MOTION, 90.0)
     still = simulator(mesh_file=str(plate))
     node = simulator(mesh_file=str(plate), model_file=str(tmp_path / 'air.yaml'))
     robot(still, node).send(motion)
@@ -74,17 +64,15 @@ def test_the_gun_decides_which_side_of_a_solid_is_outward(simulator, robot, pain
     offline = toward_the_guns(read_mesh(plate, 1.0, 0.05), motions)
     np.testing.assert_array_equal(node.surface.outward, [1.0, 0.0, 0.0])
     np.testing.assert_array_equal(offline.outward, node.surface.outward)
-    integrator = FilmIntegrator(offline.points(), model, 'single', offline.occluder)
-    integrator.add(spray_path(motion, max_step_m=model.max_step_m)[0])
-    assert np.array_equal(painted(node), integrator.film_um)
+    seen = SimpleNamespace(points=offline.points(), surface=offline)
+    assert np.array_equal(painted(node), offline_um(seen, motion, model))
 
 
-def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wait_until,
-                                                         tmp_path):  # fmt: skip
+def test_a_large_mesh_costs_a_robot_at_250_hz_no_pose(simulator, onlooker, wait_until, tmp_path):
     """100,000 triangles go out five times a second, to a subscriber, while poses come."""
     node = simulator(max_edge_length_m=0.0045, publish_rate_hz=5.0, pose_queue_depth=5000)
     assert len(node.surface.faces) > 100_000
-    viewer = onlooker({'thickness/mesh': (Marker, topics.LATCHED)})
+    viewer = onlooker('thickness/mesh')
     motion = two_passes(poses=750, trigger=False)
     bag = write_pose_bag(tmp_path / 'motion', motion)
     with NodeProcess(tmp_path / 'player', 'bag_player', bag=bag) as replay:
@@ -94,19 +82,15 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
     assert node.inputs[0].intervals.long == 0
     # Meshes of 12 MB reached the subscriber meanwhile, and the last one shows the last pose.
     meshes = viewer.heard['thickness/mesh']
-    wait_until(
-        lambda: header_stamp_ns(meshes[-1]) == motion.stamps_ns[-1], what='the mesh at the end'
-    )
+    wait_until(lambda: header_stamp_ns(meshes[-1]) == motion.stamps_ns[-1], what='the last mesh')
     assert len({header_stamp_ns(mesh) for mesh in meshes}) > 3
     assert min(map(len, meshes)) > 120 * 100_000
 
 
-def test_a_listener_that_stalls_gets_no_queue(simulator, robot, painted, onlooker, wait_until,
-                                              tmp_path):  # fmt: skip
+def test_a_listener_that_stalls_gets_no_queue(simulated, painted, onlooker, wait_until, tmp_path):
     """Nobody is sent the next message before all have taken the last one, and none is lost."""
-    node = simulator(publish_rate_hz=30.0)
-    source = robot(node)
-    other = onlooker({'thickness/field': (ThicknessField, topics.RESULTS)})
+    node, source = simulated(publish_rate_hz=30.0)
+    other = onlooker('thickness/field')
     with NodeProcess(tmp_path / 'listener', '', code=LISTENER) as listener:
         wait_until(lambda: 'heard' in listener.out, what='the listener')
         listener.stall()

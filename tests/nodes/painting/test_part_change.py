@@ -9,34 +9,28 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import trimesh
 from geometry_msgs.msg import PoseStamped
-from paint_msgs.msg import Part, ThicknessStats
 from paint_msgs.srv import ChangePart
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import TransitionCallbackReturn
 
 import paint_deposition as pd
 from brushes import two_brushes
-from nodes.cell import PANEL_M, offline_um, parameters, two_passes, write_panel
+from nodes.cell import PANEL_M, offline_um, parameters, saved_um, two_passes, write_panel
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.model.eq1_pattern import Brush
-from paint_deposition.nodes import topics
 from paint_deposition.nodes.node import ERROR, OK
 from paint_deposition.nodes.topics import AdaptiveSubscription
 
 LATER_NS = 60_000_000_000
-SERVICE = '/deposition_simulator/change_part'
-
-
-def closed_at_its_end(motion: pd.Trajectory) -> pd.Trajectory:
-    """The gun is off when the part leaves."""
-    return replace(
-        motion,
-        trigger_stamps_ns=np.append(motion.trigger_stamps_ns, motion.stamps_ns[-1]),
-        trigger_flow=np.append(motion.trigger_flow, 0.0),
-    )
+OPEN = two_passes(poses=300)
+# The gun is off when the part leaves.
+MOTION = replace(
+    OPEN, trigger_flow=np.append(OPEN.trigger_flow, 0.0),
+    trigger_stamps_ns=np.append(OPEN.trigger_stamps_ns, OPEN.stamps_ns[-1]),
+)  # fmt: skip
+WITHOUT_TRIGGER = two_passes(poses=300, trigger=False)
 
 
 def later(motion: pd.Trajectory) -> pd.Trajectory:
@@ -47,17 +41,26 @@ def later(motion: pd.Trajectory) -> pd.Trajectory:
     )
 
 
-MOTION = closed_at_its_end(two_passes(poses=300))
-WITHOUT_TRIGGER = two_passes(poses=300, trigger=False)
+@pytest.fixture
+def asked(onlooker, wait_until):
+    """`asked(**fields)`: the future of the simulator's answer, whoever spins."""
+    client = onlooker().create_client(ChangePart, '/deposition_simulator/change_part')
+
+    def asked(**fields):
+        wait_until(client.service_is_ready)
+        return client.call_async(ChangePart.Request(**fields))
+
+    return asked
 
 
 @pytest.fixture
-def change(call, onlooker):
+def change(asked, wait_until):
     """`change(**fields)`: the answer of the simulator."""
-    operator = onlooker({})
 
     def change(**fields) -> ChangePart.Response:
-        return call(operator, ChangePart, SERVICE, ChangePart.Request(**fields))
+        future = asked(**fields)
+        wait_until(future.done, what='the change')
+        return future.result()
 
     return change
 
@@ -65,22 +68,7 @@ def change(call, onlooker):
 @pytest.fixture
 def wider(tmp_path):
     """The mesh of another part."""
-    path = write_panel(tmp_path / 'wider.stl')
-    mesh = pd.read_mesh(path, max_edge_length_m=0.05)
-    trimesh.Trimesh(1.3 * mesh.vertices_m, mesh.faces).export(path)
-    return str(path)
-
-
-@pytest.fixture
-def asked(onlooker, wait_until):
-    """`asked(**fields)`: the future of the simulator's answer, whoever spins."""
-    client = onlooker({}).create_client(ChangePart, SERVICE)
-
-    def asked(**fields):
-        wait_until(client.service_is_ready)
-        return client.call_async(ChangePart.Request(**fields))
-
-    return asked
+    return str(write_panel(tmp_path / 'wider.stl', scale=1.3))
 
 
 def test_each_part_has_its_film_and_its_run(
@@ -90,9 +78,7 @@ def test_each_part_has_its_film_and_its_run(
     folder = tmp_path / 'films'
     node = simulator(part_pose=[0.0] * 6 + [1.0], part_parent_frame='cell')
     recorder = record(output_directory=str(folder), name='before')
-    viewer = onlooker(
-        {'part': (Part, topics.LATCHED), 'thickness/stats': (ThicknessStats, topics.LATCHED)}
-    )
+    viewer = onlooker('part', 'thickness/stats')
     source = robot(node, recorder)
     motions, films = (MOTION, later(MOTION)), []
     for number, (motion, mesh) in enumerate(zip(motions, (node.mesh_file, wider), strict=True)):
@@ -126,24 +112,20 @@ def test_each_part_has_its_film_and_its_run(
         assert messages['/atomizer/state'] == len(motion.triggers) + number
         assert messages['/thickness/field']
         assert f'serial: 47-{number}' in (run / 'metadata.yaml').read_text()
-        saved = np.loadtxt(run / 'film.csv', delimiter=',', skiprows=1)[:, 3]
-        assert saved == pytest.approx(film, rel=1e-7)
+        assert saved_um(run / 'film.csv') == pytest.approx(film, rel=1e-7)
         figures = json.loads((run / 'film.json').read_text())
         described = {'serial': f'47-{number}', 'type': 'door', 'coat': 1}
         assert figures['part'].items() >= described.items()
         assert figures['poses']['received'] == len(MOTION)
 
 
-def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
-    simulator, robot, painted, change, wider, wait_until, tmp_path
-):
-    """Closed before the change it is closed after it, and it sprays on with its brush."""
+def test_the_gun_and_its_brush_stay(simulated, painted, change, wider, wait_until, tmp_path):
+    """Closed before a change, closed after it; the brush must be in a model that is set."""
     brushes = two_brushes()
     pd.write_model(tmp_path / 'brushes.yaml', brushes)
     other = pd.DepositionModel(brushes=[Brush(number=1, planar=brushes.planar)])
     pd.write_model(tmp_path / 'other.yaml', other)
-    node = simulator(model_file=str(tmp_path / 'brushes.yaml'), repaint=False)
-    source = robot(node)
+    node, source = simulated(model_file=str(tmp_path / 'brushes.yaml'), repaint=False)
     source.send_state(WITHOUT_TRIGGER.stamps_ns[0], 1.0, brush=2)
     source.send(WITHOUT_TRIGGER)
     painted(node, len(WITHOUT_TRIGGER))
@@ -160,79 +142,69 @@ def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
     assert painted(node, len(WITHOUT_TRIGGER)).max() == 0.0
 
 
-def test_meshes_that_were_read_are_there_at_once_in_the_shape_they_have(
-    simulator, change, wider, tmp_path
-):
+def test_meshes_are_read_once_for_each_shape_they_have(simulator, change, wider, tmp_path):
     """Read ahead, or of a part that has left; one that was exported anew is read again."""
     node = simulator()
     first, third = node.mesh_file, str(write_panel(tmp_path / 'third.stl', reverse=True))
     prepared = change(mesh_file=third, prepare=True)
-    assert prepared.success
+    assert (prepared.success, node.mesh_file) == (True, first)
     assert 'third.stl is prepared: Surface(' in prepared.message
-    assert node.mesh_file == first
 
     def ready() -> str:
         return node.parts.status().values['meshes prepared']
 
-    def width_m() -> float:
-        return np.ptp(node.points.positions_m[:, 0])
-
     assert ready() == third
-    assert change(serial='1', mesh_file=third).success
-    assert ready() == first
-    assert change(serial='2', mesh_file=wider).success
-    assert ready() == f'{first} {third}'
-    assert change(serial='3', mesh_file=first).success
-    assert ready() == f'{third} {wider}'
+    for serial, mesh, kept in (
+        ('1', third, [first]), ('2', wider, [first, third]), ('3', first, [third, wider]),
+    ):  # fmt: skip
+        assert change(serial=serial, mesh_file=mesh).success
+        assert ready().split() == kept
     # Under the name of the part in the cell, and of one that was there before.
     narrow = Path(first).read_bytes()
     shutil.copy(wider, first)
     assert change(serial='4').success
-    assert width_m() == pytest.approx(1.3 * PANEL_M)
+    assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(1.3 * PANEL_M)
     Path(first).write_bytes(narrow)
     assert change(serial='5', mesh_file=wider).success
     assert change(serial='6', mesh_file=first).success
-    assert width_m() == pytest.approx(PANEL_M)
+    assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(PANEL_M)
 
 
-def test_a_further_coat_lies_on_the_first(simulator, robot, painted, change,
-                                                      tmp_path):  # fmt: skip
-    node = simulator()
-    source = robot(node)
+def test_a_further_coat_lies_on_the_first(simulated, painted, change, tmp_path):
+    node, source = simulated()
     assert 'coat: the part in the cell has no serial' in change(serial='A-1', coat=True).message
     assert change(serial='A-1').success
     source.send(MOTION)
     once = painted(node, len(MOTION))
     assert "serial 'A-1' is the part in the cell: set coat: true" in change(serial='A-1').message
-    other = change(serial='A-2', coat=True)
-    assert "coat: the part in the cell is 'A-1' of " in other.message
+    assert "the part in the cell is 'A-1' of " in change(serial='A-2', coat=True).message
     same_mesh = node.mesh_file.replace('/panel', '/../' + tmp_path.name + '/panel')
     coat = change(serial='A-1', coat=True, mesh_file=same_mesh)
-    assert coat.success, coat.message
-    assert coat.run == 'A-1_coat_2'
+    assert (coat.success, coat.run) == (True, 'A-1_coat_2'), coat.message
     source.send(later(MOTION))
     assert painted(node, 2 * len(MOTION)) == pytest.approx(2.0 * once, rel=1e-5, abs=1e-6)
     assert change(serial='A-2').success
     files = [tmp_path / 'films' / run / 'film.json' for run in ('A-1', 'A-1_coat_2')]
     figures = [json.loads(file.read_text()) for file in files]
-    assert [f['part']['coat'] for f in figures] == [1, 2]
+    assert [one['part']['coat'] for one in figures] == [1, 2]
     assert figures[1]['mean_um'] == pytest.approx(2.0 * figures[0]['mean_um'], rel=0.1)
     done_before = change(serial='A-1')
     assert not done_before.success
     assert 'A-1 already exists: a part has one run for each coat' in done_before.message
 
 
-def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted, change,
-                                                      tmp_path):  # fmt: skip
-    node = simulator()
-    robot(node).send(MOTION)
+def test_what_cannot_be_is_refused_and_the_part_stays(simulated, painted, change, tmp_path):
+    """A pose that is refused after the change costs no film."""
+    node, source = simulated(part_parent_frame='cell')
+    assert change(serial='1').success
+    source.send(MOTION)
     film = painted(node, len(MOTION))
     for fields, message in (
         ({'serial': ''}, "serial '': use at most 200 letters"),
         ({'serial': '../4711'}, "serial '../4711': use at most 200"),
         ({'serial': '..'}, "serial '..': use at most"),
-        ({'serial': '1', 'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
-        ({'serial': '1', 'part_pose': [0.0, 0.0, 0.0]}, 'part_pose'),
+        ({'serial': '2', 'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
+        ({'serial': '2', 'part_pose': [0.0, 0.0, 0.0]}, 'part_pose'),
         ({'prepare': True}, 'prepare needs a mesh_file'),
     ):
         answer = change(**fields)
@@ -240,76 +212,51 @@ def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted,
         assert message in answer.message
     assert np.array_equal(node.film.snapshot().film_um, film)
     assert not (tmp_path / 'films').exists()
+    refused = SetParametersResult(successful=False, reason='not now')
+    node.add_on_set_parameters_callback(lambda changes: refused)
+    answer = change(serial='2', part_pose=[0.0] * 6 + [1.0])
+    assert (answer.success, answer.run) == (False, '2')
+    assert 'it stands where the part before did: not now' in answer.message
+    assert saved_um(tmp_path / 'films/1/film.csv') == pytest.approx(film, rel=1e-7)
 
 
-def test_a_film_is_kept_until_it_is_on_disk(simulator, robot, painted, change, tmp_path):
-    """The part changes all the same, and the answer says both."""
+def test_a_film_is_kept_until_it_is_on_disk(simulated, painted, change, tmp_path):
+    """The node stays as it is; the part changes all the same, and the answer says both."""
     folder = tmp_path / 'films'
-    node = simulator(part_parent_frame='cell')
-    source = robot(node)
+    node, source = simulated(part_parent_frame='cell')
     assert change(serial='1').success
     source.send(MOTION)
     film = painted(node, len(MOTION))
     folder.write_text('in the way, as a disk that is full')
+    node.trigger_deactivate()
+    for _ in range(2):
+        assert node.trigger_cleanup() == TransitionCallbackReturn.FAILURE
+    assert node.configured
+    unsaved = 'films of 1 former parts are not saved'
+    assert unsaved in node.tasks['state']().message
+    node.trigger_activate()
     second = change(serial='2')
     assert (second.success, second.run, second.paths) == (True, '2', [])
-    assert 'films of 1 former parts are not saved, and kept' in second.message
+    assert f'{unsaved}, and kept' in second.message
     assert node.parts.status().level == ERROR
     folder.unlink()
     source.send(later(MOTION))
     painted(node, len(MOTION))
     third = change(serial='3')
     assert [Path(path).parent.name for path in third.paths] == 3 * ['1'] + 3 * ['2']
-    saved = np.loadtxt(folder / '1/film.csv', delimiter=',', skiprows=1)[:, 3]
-    assert saved == pytest.approx(film, rel=1e-7)
+    assert saved_um(folder / '1/film.csv') == pytest.approx(film, rel=1e-7)
     assert node.parts.status().level == OK
-
-
-def test_a_film_that_cannot_be_saved_keeps_the_node_as_it_is(simulator, robot, painted, change,
-                                                             tmp_path):  # fmt: skip
-    folder, node = tmp_path / 'films', simulator()
-    assert change(serial='1').success
-    robot(node).send(MOTION)
-    film = painted(node, len(MOTION))
-    folder.write_text('in the way')
     node.trigger_deactivate()
-    for _ in range(2):
-        assert node.trigger_cleanup() == TransitionCallbackReturn.FAILURE
-    assert node.configured
-    assert 'films of 1 former parts are not saved' in node.tasks['state']().message
-    folder.unlink()
-    assert change(serial='2').success
-    saved = np.loadtxt(folder / '1/film.csv', delimiter=',', skiprows=1)[:, 3]
-    assert saved == pytest.approx(film, rel=1e-7)
     assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
     assert not node.configured
 
 
-def test_a_pose_that_is_refused_after_the_change_costs_no_film(simulator, robot, painted, change,
-                                                               tmp_path):  # fmt: skip
-    node = simulator(part_parent_frame='cell')
-    assert change(serial='1').success
-    robot(node).send(MOTION)
-    painted(node, len(MOTION))
-    refused = SetParametersResult(successful=False, reason='not now')
-    node.add_on_set_parameters_callback(lambda changes: refused)
-    answer = change(serial='2', part_pose=[0.0] * 6 + [1.0])
-    assert (answer.success, answer.run) == (False, '2')
-    assert 'it stands where the part before did: not now' in answer.message
-    assert (tmp_path / 'films/1/film.csv').is_file()
-
-
 @pytest.mark.parametrize(('pose', 'frame'), [([], 'part'), ([0.0] * 6 + [1.0], 'cell')])
-def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot, painted, asked,
-                                                               wait_until, tmp_path, pose,
-                                                               frame):  # fmt: skip
-    """Poses that came while the next mesh was read are painted where the old part stands."""
-    node = simulator(part_pose=pose, part_parent_frame='cell')
-    large, broken = write_panel(tmp_path / 'large.stl'), tmp_path / 'broken.stl'
-    mesh = pd.read_mesh(large, max_edge_length_m=0.005)
-    trimesh.Trimesh(mesh.vertices_m, mesh.faces).export(large)
+def test_a_change_that_fails_is_none(simulated, painted, asked, wait_until, tmp_path, pose, frame):
+    """Pose and poses that came meanwhile are left to the old part."""
+    node, source = simulated(part_pose=pose, part_parent_frame='cell')
+    large, broken = write_panel(tmp_path / 'large.stl', scale=8.0), tmp_path / 'broken.stl'
     broken.write_text('no mesh')
-    source = robot(node)
     # The broken mesh is looked at after the large one.
     asked(prepare=True, mesh_file=str(large))
     aside = [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
@@ -328,25 +275,21 @@ def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot,
 
 
 def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
-    simulator, robot, painted, asked, record, wider, wait_until, tmp_path
+    simulator, robot, painted, change, asked, record, wider, wait_until, tmp_path
 ):
-    """Two states are sent early, and half the poses before the part is announced.
-
-    The robot's clock is ahead, and the part between has no poses.
-    """
+    """Two states are sent early, the robot's clock is ahead, the part between has no poses."""
     ahead_ns = time.time_ns() + 60 * LATER_NS - WITHOUT_TRIGGER.stamps_ns[0]
     moved = replace(WITHOUT_TRIGGER, stamps_ns=WITHOUT_TRIGGER.stamps_ns + ahead_ns)
     node = simulator(max_edge_length_m=0.015, part_parent_frame='cell')
     recorder = record(output_directory=str(tmp_path / 'films'), name='before')
     source = robot(node, recorder)
     half = len(moved) // 2
-    stamps = moved.stamps_ns
     for row, flow in ((0, 1.0), (half + 50, 0.0), (half + 90, 0.5)):
-        source.send_state(stamps[row], flow)
+        source.send_state(moved.stamps_ns[row], flow)
     source.send(moved, slice(0, half))
-    film, points, surface = painted(node, half), node.points, node.surface
-    between = asked(serial='0')
-    wait_until(between.done, what='the part between')
+    film = painted(node, half)
+    before = SimpleNamespace(points=node.points, surface=node.surface)
+    assert change(serial='0').success
     future = asked(serial='1', mesh_file=wider, part_pose=[0.0] * 6 + [1.0])
     wait_until(lambda: node.parts.waiting, what='the request')
     source.send(moved, slice(half, None), frame_id='cell')
@@ -354,7 +297,6 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
     second = painted(node, len(moved) - half)
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == half, what='the run')
     recorder.close()
-    before = SimpleNamespace(points=points, surface=surface)
     for run, live, of in (('before', film, before), ('1', second, node)):
         motion = pd.read_recording(tmp_path / 'films' / run, state_topic='/atomizer/state')
         assert len(motion) == half
@@ -362,11 +304,8 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
     assert second.max() > 1.0
 
 
-def test_a_pose_that_comes_while_the_film_is_reset_is_of_the_run_that_begins(
-    simulator, robot, painted, change, monkeypatch
-):
-    node = simulator()
-    source, reset = robot(node), LiveFilms.reset
+def test_a_pose_during_a_reset_is_of_the_run_that_begins(simulated, painted, change, monkeypatch):
+    (node, source), reset = simulated(), LiveFilms.reset
     assert change(serial='1').success
     source.send(WITHOUT_TRIGGER, slice(0, 10))
     painted(node, 10)
@@ -384,15 +323,12 @@ def test_a_pose_that_comes_while_the_film_is_reset_is_of_the_run_that_begins(
 
 
 @pytest.mark.parametrize('placed', [True, False])
-def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
-    simulator, robot, painted, asked, wait_until, placed
-):
+def test_poses_that_wait_are_of_their_part(simulator, robot, painted, asked, wait_until, placed):
     """The change waits for them; without a transform they are refused on their own part."""
     node = simulator()
     # A cell in which transforms may come.
-    node.frame.tf_topics.append(
-        AdaptiveSubscription(node, PoseStamped, 'tf_of_another_kind', print, depth=1)
-    )
+    transforms = AdaptiveSubscription(node, PoseStamped, 'tf_of_another_kind', print, depth=1)
+    node.frame.tf_topics.append(transforms)
     source = robot(node)
     source.send(MOTION, frame_id='cell')
     wait_until(lambda: len(node.inputs[0].tf_queue) == len(MOTION), what='poses that wait')
@@ -407,8 +343,7 @@ def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
     if placed:
         figures = json.loads(Path(answer.paths[2]).read_text())
         assert figures['poses']['received'] == len(MOTION)
-        saved = np.loadtxt(answer.paths[1], delimiter=',', skiprows=1)[:, 3]
-        assert saved == pytest.approx(offline_um(node, MOTION), rel=1e-7)
+        assert saved_um(answer.paths[1]) == pytest.approx(offline_um(node, MOTION), rel=1e-7)
     else:
         assert not answer.paths
     assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))

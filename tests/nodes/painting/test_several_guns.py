@@ -1,30 +1,19 @@
 """Several guns on one part: one film, live and replayed, whoever's poses come first."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
-from paint_msgs.msg import ThicknessField, ThicknessStats
-from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
-from nodes.cell import Robot, offline_um, two_passes
+from nodes.cell import Robot, offline_um, turned, two_passes
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.files.motion_files import MotionSource, read_gun_motions
-from paint_deposition.nodes import topics
 
 
 def moved(motion: pd.Trajectory, by_m: list[float]) -> pd.Trajectory:
     return replace(motion, positions_m=motion.positions_m + by_m)
-
-
-def from_behind(motion: pd.Trajectory) -> pd.Trajectory:
-    """The motion turned by half a turn about the vertical z."""
-    half_turn = Rotation.from_euler('z', np.pi)
-    turned = half_turn * Rotation.from_quat(motion.quaternions_xyzw)
-    return replace(
-        motion, positions_m=half_turn.apply(motion.positions_m), quaternions_xyzw=turned.as_quat()
-    )
 
 
 GUNS = ['robot_1', 'robot_2']
@@ -48,15 +37,14 @@ def guns(ros_context, spin, wait_until):
 
 def test_each_guns_share_is_reported(simulator, guns, painted, onlooker, wait_until):
     node = simulator(atomizers=GUNS)
-    fields = {f'{gun}/thickness/field': (ThicknessField, topics.RESULTS) for gun in GUNS}
-    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)} | fields)
+    fields = [f'{gun}/thickness/field' for gun in GUNS]
+    viewer = onlooker('thickness/stats', *fields)
     first, second = guns(node)
     first.send(HIGH)
     second.send(LOW)
-    painted(node, len(HIGH) + len(LOW))
+    poses = len(HIGH) + len(LOW)
+    painted(node, poses)
     alone = [offline_um(node, motion) for motion in (HIGH, LOW)]
-
-    poses, films = len(HIGH) + len(LOW), dict(zip(fields, alone, strict=True))
     wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.poses_received == poses))
     stats = viewer.newest('thickness/stats')
     volumes = np.array([film @ node.surface.vertex_areas_m2 for film in alone])
@@ -64,25 +52,22 @@ def test_each_guns_share_is_reported(simulator, guns, painted, onlooker, wait_un
     assert np.allclose(stats.atomizer_volume_cm3, volumes, rtol=1e-12)
     assert np.allclose(stats.atomizer_share, volumes / volumes.sum(), rtol=1e-12)
     assert sum(stats.atomizer_volume_cm3) == pytest.approx(stats.painted_volume_cm3, rel=1e-12)
-    for topic, film in films.items():
-        shown = film.astype(np.float32)
-        wait_until(
-            lambda t=topic, s=shown: viewer.shows(t, lambda m: np.array_equal(m.thickness_um, s)),
-            what=topic,
-        )
-    share = f'{volumes[1] / volumes.sum():.1%}'
-    task = 'deposition_simulator: film'
-    wait_until(lambda: viewer.value(task, 'share of robot_2') == share, what=share)
-    # Of each gun's poses by themselves.
-    task = 'deposition_simulator: robot_2/poses'
-    wait_until(lambda: viewer.value(task, 'poses taken') == str(len(LOW)), what='its poses')
+    for topic, film in zip(fields, alone, strict=True):
+        same = partial(np.array_equal, film.astype(np.float32))
+        wait_until(lambda t=topic, s=same: viewer.shows(t, lambda m: s(m.thickness_um)), topic)
+    for task, key, value in (
+        ('film', 'share of robot_2', f'{volumes[1] / volumes.sum():.1%}'),
+        ('robot_2/poses', 'poses taken', str(len(LOW))),
+    ):
+        told = f'deposition_simulator: {task}', key
+        wait_until(lambda t=told, v=value: viewer.value(*t) == v, what=value)
 
 
 def test_the_first_gun_decides_which_side_is_outward(simulator, guns, painted, wait_until):
     """Two guns on the two sides of a sheet; the one behind it comes first."""
     node = simulator(atomizers=GUNS)
     first, second = guns(node)
-    behind = from_behind(LOW)
+    behind = turned(LOW, 180.0)
     second.send(behind)
     painted(node, len(behind))
     wait_until(lambda: node.surface.outward[1] > 0.0, what='the part turned to the second gun')
@@ -99,10 +84,7 @@ def test_what_does_not_go_together_is_refused(simulator, tmp_path):
     one_film = r'robot_1 and robot_2 differ in what acts on the finished film.*\(sag\)'
     for values, words in (
         ({'model_files': [thin]}, 'model_files names 1 models for 2 atomizers: give'),
-        (
-            {'model_files': [thin, thin], 'model_file': thin},
-            'atomizers and model_file another: give model_file',
-        ),
+        ({'model_files': [thin, thin], 'model_file': thin}, 'another: give model_file'),
         ({'model_files': [thin, sagging]}, one_film),
         ({'atomizers': ['robot_1', 'robot_1']}, r'atomizers is .*give different names'),
         ({'atomizers': ['../robot']}, r'atomizers is .*give different names'),
@@ -111,9 +93,7 @@ def test_what_does_not_go_together_is_refused(simulator, tmp_path):
             simulator(**{'atomizers': GUNS} | values)
 
 
-def test_the_film_is_the_sum_of_the_guns_whoever_comes_first_and_that_of_their_run_replayed(
-    simulator, record, guns, wait_until, painted, play, tmp_path
-):
+def test_the_film_is_the_sum_of_guns(simulator, record, guns, wait_until, painted, play, tmp_path):
     """In turn, one after the other, from one bag by a player for each gun, and offline."""
     pd.write_model(tmp_path / 'thin.yaml', THIN)
     low = moved(two_passes(poses=320), [0.1, 0.0, -0.15])

@@ -1,6 +1,7 @@
 """Another model while the part is painted, and a model of several brushes."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,28 +24,20 @@ POSES = 'deposition_simulator: poses'
 
 @pytest.fixture
 def set_model(tmp_path):
-    """`set_model(node, model)`: set it at run time; None is the default one."""
+    """`set_model(node, model)`: set it, or its file, at run time; '' is the default one."""
 
-    def set_model(node, model: pd.DepositionModel | None) -> None:
-        path = tmp_path / 'new.yaml'
-        if model is not None:
-            pd.write_model(path, model)
-        changes = parameters(model_file=str(path) if model is not None else '')
-        assert node.set_parameters(changes)[0].successful
+    def set_model(node, model: pd.DepositionModel | Path | str) -> None:
+        if isinstance(model, pd.DepositionModel):
+            pd.write_model(tmp_path / 'new.yaml', model)
+            model = tmp_path / 'new.yaml'
+        (result,) = node.set_parameters(parameters(model_file=str(model)))
+        assert result.successful, result.reason
 
     return set_model
 
 
-@pytest.fixture
-def node(simulator, tmp_path):
-    pd.write_model(tmp_path / 'brushes.yaml', BRUSHES)
-    return simulator(model_file=str(tmp_path / 'brushes.yaml'))
-
-
-def test_a_new_model_paints_the_motion_so_far_again(simulator, robot, painted, wait_until,
-                                                    set_model):  # fmt: skip
-    node = simulator()
-    source = robot(node)
+def test_a_new_model_paints_the_motion_so_far_again(simulated, painted, wait_until, set_model):
+    node, source = simulated()
     source.send(MOTION, slice(0, 300))
     painted(node, 300)
     set_model(node, MODEL)
@@ -56,7 +49,7 @@ def test_a_new_model_paints_the_motion_so_far_again(simulator, robot, painted, w
     assert np.array_equal(film, offline_um(node, MOTION, MODEL))
     assert not np.array_equal(film, offline_um(node, MOTION))
     # Back to the model of before: as if it had never been another.
-    set_model(node, None)
+    set_model(node, '')
     wait_until(lambda: not node.repainting)
     assert np.array_equal(node.film.snapshot().film_um, offline_um(node, MOTION))
     # A reset while a model is prepared is kept.
@@ -67,17 +60,13 @@ def test_a_new_model_paints_the_motion_so_far_again(simulator, robot, painted, w
     assert np.array_equal(painted(node), offline_um(node, MOTION, MODEL))
 
 
-def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
-    simulator, robot, painted, onlooker, wait_until, tmp_path
-):
+def test_an_effect_holds_up_no_pose(simulated, painted, onlooker, wait_until, set_model, tmp_path):
     """Neither compiling it nor using it may hold up the executor."""
     own = write_own_model(tmp_path)
-    node = simulator(allow_user_effects=True)
-    source, viewer = robot(node), onlooker()
+    (node, source), viewer = simulated(allow_user_effects=True), onlooker()
     source.send(MOTION, slice(0, 300))
     painted(node, 300)
-    (result,) = node.set_parameters(parameters(model_file=str(own)))
-    assert result.successful, result.reason
+    set_model(node, own)
     source.send(MOTION, slice(300, None))
     film = painted(node)
     assert node.repainting
@@ -92,8 +81,7 @@ def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
     # One that does not compile is told, and the old model goes on.
     code = (tmp_path / 'own.py').read_text()
     (tmp_path / 'own.py').write_text(code.replace('1.0 + gain *', "'one' + gain *"))
-    (result,) = node.set_parameters(parameters(model_file=str(own)))
-    assert result.successful, result.reason
+    set_model(node, own)
     wait_until(lambda: not node.repainting, what='the end of the trial')
     problem = node.model_problem
     assert 'own.py: Own has a flux_factor that does not compile' in problem
@@ -102,56 +90,43 @@ def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
     wait_until(lambda: viewer.reports('deposition_simulator: film', problem), what='diagnostics')
 
 
-def test_effect_files_need_leave_at_the_start_and_later(simulator, tmp_path):
+def test_a_model_that_a_peer_sets_runs_and_reads_no_file(simulator, tmp_path, tmp_path_factory):
+    """Files elsewhere are not opened, and a message holds nothing of those that are no models."""
     own = write_own_model(tmp_path)
     (tmp_path / 'own.py').write_text('raise SystemExit("run without leave")')
-    refusal = (
-        f'{own}: effect file {tmp_path}/own.py is not run, because it is Python code; if you '
-        'trust it, start the node with allow_user_effects:=true'
-    )
     with pytest.raises(ModelError) as refused:
         simulator(model_file=str(own))
-    assert str(refused.value) == refusal
+    refusal = str(refused.value)
+    assert refusal.startswith(f'{own}: effect file {tmp_path}/own.py is not run, because it is P')
+    assert refusal.endswith('start the node with allow_user_effects:=true')
     node = simulator()
-    result = node.set_parameters_atomically(parameters(model_file=str(own)))
-    assert (result.successful, result.reason) == (False, refusal)
+
+    def told(**values) -> str:
+        return node.set_parameters_atomically(parameters(**values)).reason
+
+    assert told(model_file=str(own)) == refusal
     # Nobody who can set parameters can give leave.
-    both = parameters(allow_user_effects=True, model_file=str(own))
-    assert not node.set_parameters_atomically(both).successful
+    assert told(allow_user_effects=True, model_file=str(own))
     assert not node.get_parameter('allow_user_effects').value
-
-
-def test_a_peer_reads_no_files_by_setting_a_model(simulator, tmp_path, tmp_path_factory):
-    """Files elsewhere are not opened, and a message holds nothing of those that are no models."""
-    node = simulator()
     elsewhere = tmp_path_factory.mktemp('elsewhere') / 'model.yaml'
     elsewhere.write_text('planar: {K2: 0.3}')
     (tmp_path / 'link.yaml').symlink_to(elsewhere)
     for file in (elsewhere, '/etc/passwd', '/dev/zero', tmp_path / 'link.yaml'):
-        (result,) = node.set_parameters(parameters(model_file=str(file)))
-        assert not result.successful
-        assert 'is in no folder that deposition_simulator was given at its start' in result.reason
-    for text in (
-        'secret',
-        'a: &b secret\nb: *b',
-        '- secret',
-        'K2: "secret\n',
-        'planar: secret' * 99,
-    ):
+        outside = 'is in no folder that deposition_simulator was given at its start'
+        assert outside in told(model_file=str(file))
+    texts = 'secret', 'a: &b secret\nb: *b', '- secret', 'K2: "secret\n', 'planar: secret' * 99
+    for text in texts:
         (tmp_path / 'model.yaml').write_text(text)
-        (result,) = node.set_parameters(parameters(model_file=str(tmp_path / 'model.yaml')))
-        assert not result.successful
-        assert len(result.reason.replace(str(tmp_path), '')) < 300
-        assert 'secret' not in result.reason or text.startswith('planar')
+        reason = told(model_file=str(tmp_path / 'model.yaml')).replace(str(tmp_path), '')
+        assert 0 < len(reason) < 300
+        assert 'secret' not in reason or text.startswith('planar')
     node = simulator(input_folders=[str(elsewhere.parent)])
-    assert node.set_parameters(parameters(model_file=str(elsewhere)))[0].successful
-    assert not node.set_parameters(parameters(input_folders=['/']))[0].successful
+    assert told(model_file=str(elsewhere)) == ''
+    assert told(input_folders=['/'])
 
 
-def test_a_new_model_may_also_paint_from_then_on_only(simulator, robot, painted, wait_until,
-                                                      set_model):  # fmt: skip
-    node = simulator(repaint=False)
-    source = robot(node)
+def test_a_new_model_may_also_paint_from_then_on_only(simulated, painted, wait_until, set_model):
+    node, source = simulated(repaint=False)
     source.send(MOTION, slice(0, 300))
     before = painted(node, 300)
     set_model(node, THIN)
@@ -163,27 +138,21 @@ def test_a_new_model_may_also_paint_from_then_on_only(simulator, robot, painted,
     assert np.abs(painted(node) - expected).max() < 0.05 * whole.max()
 
 
-def test_a_brush_that_is_not_in_the_model_is_refused_and_those_it_has_are_named(
-    node, robot, painted, onlooker, wait_until
-):
-    """The paint of such a state is not painted."""
-    viewer = onlooker()
+def test_a_brush_of_no_model_is_refused(simulated, painted, onlooker, wait_until, tmp_path):
+    """The paint of such a state is not painted, nor any before a state names a brush."""
+    pd.write_model(tmp_path / 'brushes.yaml', BRUSHES)
+    (node, source), viewer = simulated(model_file=str(tmp_path / 'brushes.yaml')), onlooker()
+    source.send(two_passes(trigger=False))
+    assert painted(node).max() == 0.0
+    wait_until(lambda: viewer.reports(POSES, 'no state names one of the brushes yet'))
+    node.reset()
     # The first pass with brush 2, the way back with 4 and, from its middle on, with 2.
     stamps = np.append(MOTION.trigger_stamps_ns, MOTION.stamps_ns[-100])
     given = (1.0, 2), (0.0, 2), (0.8, 4), (1.0, 2)
-    robot(node).send(replace(MOTION, **switched(stamps, *given)))
+    source.send(replace(MOTION, **switched(stamps, *given)))
     film = painted(node)
     taken = switched(stamps[[0, 1, 3]], given[0], given[1], given[3])
     assert np.array_equal(film, offline_um(node, replace(MOTION, **taken), BRUSHES))
     refusal = 'brush 4 is not in the model; its brushes: 1, 2'
     assert node.inputs[0].state_errors == {refusal}
     wait_until(lambda: viewer.reports(POSES, refusal, b'\x01'), what='the refusal')
-
-
-def test_without_a_state_nothing_says_which_brush_sprays(node, robot, painted, onlooker,
-                                                         wait_until):  # fmt: skip
-    viewer = onlooker()
-    robot(node).send(two_passes(trigger=False))
-    assert painted(node).max() == 0.0
-    told = 'no state names one of the brushes yet'
-    wait_until(lambda: viewer.reports(POSES, told), what='the warning')
