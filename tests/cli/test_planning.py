@@ -200,7 +200,7 @@ def test_points_are_written_for_people_and_robots(tmp_path):
 
 
 @pytest.mark.slow
-def test_poses_stand_in_the_frame_of_the_robot(measured, tmp_path):
+def test_poses_stand_in_the_frame_of_the_robot(tmp_path):
     pose = (1.0, 0.5, 0.0, 0, 0, 1, 0)
     # The same motion, given in the robot's frame: the part is turned by half a turn there.
     motion = moved(pd.read_recording(SAMPLES / 'door_horizontal'), Rigid.of(pose), 'base_link')
