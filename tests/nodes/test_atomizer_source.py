@@ -133,6 +133,14 @@ def test_a_signal_opens_the_gun(source, driver, switched):
     assert abs(first.header.stamp.sec - time.time()) < 60.0
 
 
+def test_a_joint_may_be_the_signal(source, driver, switched, wait_until):
+    """The rail stands at 9."""
+    node = source(joint_topic='/joint_states', trigger='/joint_states.position[0] > 3')
+    driver().move(stamps_from_now())
+    assert switched(1)[0].spraying
+    wait_until(lambda: node.poses_published == len(WAY), what='the poses')
+
+
 def test_signals_are_flow_brush_and_programmed_speed(source, driver, switched):
     source(
         trigger='/paint_ml_min > 5', flow='/paint_ml_min', calibrated_flow=250.0,

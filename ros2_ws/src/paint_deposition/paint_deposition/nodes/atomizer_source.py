@@ -107,9 +107,9 @@ class AtomizerSource(PaintNode):
         self._state_publisher = self.create_publisher(
             AtomizerState, 'atomizer/state', LATCHED_STATES
         )
-        # Callbacks of the topics that have no publisher yet.
-        self._missing: dict[str, Callable[..., None]] = {
-            signal.topic: self._on_signal_message for signal in self._signals.values()
+        # Topics that have no publisher yet, with their callbacks; joints may be signals, too.
+        self._missing: set[tuple[str, Callable[..., None]]] = {
+            (signal.topic, self._on_signal_message) for signal in self._signals.values()
         }
         self._values: dict[str, float] = {}
         self._published, self._newest_ns = '', 0
@@ -121,7 +121,7 @@ class AtomizerSource(PaintNode):
         base, joints = self.values['base_link'], self.values['joint_topic']
         if self._robot is not None:
             self._motion = JointPoses(self._robot, joints, self._publish_pose)
-            self._missing[joints] = self._motion.take
+            self._missing.add((joints, self._motion.take))
         elif base:
             tip = self.values['tip_link'] or DEFAULT_TIP
             self._motion = TfPoses(self, base, tip, self._publish_pose)
@@ -182,7 +182,7 @@ class AtomizerSource(PaintNode):
 
     def _discover_topics(self) -> None:
         """Subscribe to topics as soon as their type and quality of service are known."""
-        for topic, take in tuple(self._missing.items()):
+        for topic, take in tuple(self._missing):
             found = self.get_publishers_info_by_topic(self.resolve_topic_name(topic))
             if found:
                 kind = found[0].topic_type
@@ -198,7 +198,7 @@ class AtomizerSource(PaintNode):
                         latched=True, polled=False,
                     )
                 )  # fmt: skip
-                del self._missing[topic]
+                self._missing.discard((topic, take))
         for subscription in self._heard:
             subscription.match_qos()
 
