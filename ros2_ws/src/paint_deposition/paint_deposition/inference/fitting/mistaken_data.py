@@ -291,7 +291,8 @@ def _mirrored(campaign: Campaign, some: Sequence[int]) -> Iterator[Meant]:
         if len(changed) == len(some):
             named = f'{_named(campaign, some)} look {finding}'
             x, y, z = centre_m + 0.0
-            middle = f'the part at ({x:.3f}, {y:.3f}, {z:.3f}) m' if len(some) == 1 else 'each part'
+            alone = len(some) == 1
+            middle = f'the part at ({x:.3f}, {y:.3f}, {z:.3f}) m' if alone else 'each part'
             remedy = (
                 'take the positions or the mesh of the hand that was measured: these fit the '
                 f'other one, about the middle of {middle}'
