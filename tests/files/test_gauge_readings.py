@@ -53,18 +53,30 @@ def test_every_column_arrives_and_without_labels_readings_at_one_place_are_repea
 @pytest.mark.parametrize(
     ('lines', 'message'),
     [
-        (['x_m,y_m,thickness_um', '0,0,20'], r"known as z \(columns: 'x_m', 'y_m', 'thickness_u"),
+        (
+            ['x_m,y_m,thickness_um', '0,0,20'],
+            r"known as z \(columns: 'x_m', 'y_m', 'thickness_um'\); give it with columns: {z: ",
+        ),
         (['x_mm,y_m,z_m,thickness_um', '0,0,0,20'], 'x, y, z are in .* give all in one of m, mm'),
         (['x,y,z,DFT', 'ell,ell,ell,um', '0,0,0,20'], "x, y, z are in 'ell'; give all in one"),
         (['x_m,y_m,z_m,thickness_m', '0,0,0,1'], 'no column is known as the thick'),
         (['x,y,z,dft_um,film_um', '0,0,0,1,2'], "may be in 'dft_um', 'film_um'; name one"),
-        (['x,y,z,base_um', '0,0,0,1'], r"'base_um'\); call it thickness_um, DFT, film thickness"),
+        (
+            ['x,y,z,base_um', '0,0,0,1'],
+            r"'base_um'\); call it thickness_um, DFT, film thickness or",
+        ),
         (['point,thickness_um', 'A,20'], 'no coordinates .* a list of measuring points'),
         ([], 'there is nothing to read in it'),
         ([HEADER, '0,0,0,20', '', '0,0,1,20,5'], 'line 4: 5 values under 4 column names'),
-        ([HEADER, '0,0,0,'], "below the header: 1 rows without one under 'thickness_um'"),
+        (
+            [HEADER, '0,0,0,'],
+            "no readings below the header: 1 rows without one under 'thickness_um'",
+        ),
         ([HEADER], 'no readings below the header$'),
-        (['P1,0,0,0,20', 'P2,0,0,1,21'], r"no headings \(it begins with 'P1 0 0 0 20'\); put a"),
+        (
+            ['P1,0,0,0,20', 'P2,0,0,1,21'],
+            r"no headings \(it begins with 'P1 0 0 0 20'\); put a row of headings on top, or numb",
+        ),
         (['x_m,y_m,z_m,DFT %', '0,0,0,1'], "'DFT %' is in '%': give it in µm, mil or mm"),
         ([HEADER, '0,0 um,0,20'], "line 2: y_m is '0 um'; expected a number with a decimal point"),
         ([HEADER, '0,nan,0,20'], 'line 2: y_m is nan; expected a finite number'),
@@ -73,7 +85,10 @@ def test_every_column_arrives_and_without_labels_readings_at_one_place_are_repea
         ([f'{HEADER},sigma_um', '0,0,0,20,0'], 'line 2: sigma_um is 0; expected above 0'),
         ([f'{HEADER},nx,ny', '0,0,0,20,0,1'], 'has nx, ny only; give all of nx,ny,nz or none'),
         ([f'{HEADER},nx,ny,nz', '0,0,0,20,0,0,0'], 'line 2: the normal nx,ny,nz has length zero'),
-        ([f'{HEADER},point', '0,0,0,20,A', '0.2,0,0,20,A'], "point 'A' is used 0.200 m apart; gi"),
+        (
+            [f'{HEADER},point', '0,0,0,20,A', '0.2,0,0,20,A'],
+            "point 'A' is used 0.200 m apart; give each place a label of its own",
+        ),
     ],
 )
 def test_a_fault_is_refused_in_one_line(table, lines, message):
@@ -178,8 +193,14 @@ def test_the_first_zone_that_holds_a_point_has_it_and_others_none(bracket):
         ((f'name: a, {BAND}, box: [[1, 0, 0], [0, 1, 1]]',), 'lowest corner first'),
         ((f'name: a, {BAND}, mesh_scale: 1, faces: [0]',), 'mesh_scale has no mesh'),
         ((f'name: a, {BAND}, faces: [0]',) * 2, "two zones are called 'a'"),
-        ((f'name: a, {BAND}, box: [[5, 5, 5], [6, 6, 6]]',), 'no vertex of.*5.000 to 6.000, .* m'),
-        ((f'name: a, {BAND}, mesh: part.stl', f'name: b, {BAND}, faces: [0]'), 'put it before'),
+        (
+            (f'name: a, {BAND}, box: [[5, 5, 5], [6, 6, 6]]',),
+            "zone 'a' holds no vertex of the part.* x 5.000 to 6.000, .* m, the part within",
+        ),
+        (
+            (f'name: a, {BAND}, mesh: part.stl', f'name: b, {BAND}, faces: [0]'),
+            r'belong to zones before it \(a\); put it before them',
+        ),
     ],
 )
 def test_what_is_wrong_is_named_with_the_remedy(bracket, zones, message):

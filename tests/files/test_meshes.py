@@ -190,7 +190,8 @@ def test_gltf_is_in_metres_and_its_bodies_are_one_part(tmp_path, name):
     assert box_m(surface) == [[-0.6, -0.02, -0.61], [0.6, 0.15, 0.4]]
     unit, bodies = surface.notes
     assert unit == f'{name}: glTF, in metres by its standard'
-    assert bodies.startswith(f'{name}: its 2 bodies were taken as one part: door, flange; --body')
+    expected = ': its 2 bodies were taken as one part: door, flange; --body NAME takes one of them'
+    assert bodies.startswith(f'{name}{expected}')
 
 
 def test_one_body_is_taken_by_its_name_also_of_an_obj_and_a_text_stl(tmp_path):

@@ -119,7 +119,10 @@ MAP = 'covariate: place, maps: [{part_m: [1, 1, 1], high_m: [0.5, 0.5], rows: 2'
         ('covariate: time_s, sd: [1]', 'sd has 1 values and learned 2; give one for each'),
         ('covariate: time_s, sd: [0.1, -0.2]', 'sd has -0.2; a standard deviation is 0 or more'),
         ('covariate: edge_distance_m, low: 0.4, high: 0.5', 'must be above low'),
-        ('covariate: height_fraction, kind: sum', "'sum'; expected 'factor' or 'addition': 1 + h"),
+        (
+            'covariate: height_fraction, kind: sum',
+            "kind is 'sum'; expected 'factor' or 'addition': 1 + h times",
+        ),
         ('covariate: time_s, learned: [0.1, .nan]', 'learned.1 is nan; expected a list'),
         ('covariate: time_s, kind: addition', "kind is 'addition'; over time_s give factor"),
         ('covariate: place, learned: [1, 2, 3]', 'has 3 values; its maps have 4 knots'),
@@ -151,7 +154,8 @@ def test_what_is_left_out_has_its_default(file):
         ('planar: {K2: 2}', 'planar: K2 is 2; expected a number 0 to 1: K2, weight'),
         ('planar: {K1_cm3_per_s: 0}', 'K1_cm3_per_s is 0; expected a number above 0 and up to'),
         ('planar: {K2: true}', 'K2 is True; expected a number'),
-        ('planar: {K2: 3, K3: 4}', 'weight of the centred Gaussian [1] (and 1 more)'),
+        ('planar: {K2: 3, K3: 4}', 'K2 is 3; expected a number 0 to 1: K2, '
+         'weight of the centred Gaussian [1] (and 1 more)'),
         ('planar: {K1: 2}', "planar: unknown key 'K1'; did you mean 'K1_cm3_per_s'"),
         ('planar: [1]', 'planar is [1]; expected a mapping (key: value)'),
         ('planr: {}', "model: unknown key 'planr'; did you mean 'planar'"),
@@ -174,6 +178,15 @@ def test_what_is_left_out_has_its_default(file):
         ('planar: {K2: .1, K2: .2}', 'cannot be read as YAML (line 1: found duplicate key "K2"'),
         ('planar: {K2: 2024-13-45}', 'put such a value in quotes'),
         ('planar:\n  K2: [', 'cannot be read as YAML (line 2: '),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_in_one_line(file, text: str, message: str):
+    assert message in refusal(file('model.yaml', text))
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
         ('brushes: {}', 'brushes is empty; give a brush by its number, or planar'),
         ('brushes: {0: {planar: {}}}', 'brushes: 0 is not a brush number; give 1, 2 and so on'),
         ('brushes: {1: 3}', 'brushes, 1 is 3; expected the keys '),
@@ -183,9 +196,10 @@ def test_what_is_left_out_has_its_default(file):
         ('brushes: {1: {solids: 0.4}}', 'brushes, 1: planar is missing; calibrate the brush, or'),
         ('planar: {}\nbrushes: {1: {planar: {}}}', 'planar and brushes are both given; keep one'),
     ],
-)  # fmt: skip
-def test_what_is_wrong_is_said_in_one_line(file, text: str, message: str):
-    assert message in refusal(file('model.yaml', text))
+)
+def test_what_is_no_brush_is_refused_in_one_line(file, text: str, message: str):
+    path = file('model.yaml', text)
+    assert refusal(path).startswith(f'{path}: {message}')
 
 
 def test_a_missing_or_unreadable_file_is_named(tmp_path: Path):

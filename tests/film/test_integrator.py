@@ -123,7 +123,8 @@ def test_a_film_is_finite_and_nobody_changes_it():
     with pytest.raises(ValueError, match='read-only'):
         film_um += 1.0
     broken, bare = [Broken.typical()], np.zeros(len(points))
-    with np.errstate(all='ignore'), pytest.raises(ModelError, match="'sag' gives a film of nan"):
+    nowhere = "'sag' gives a film of nan µm at"
+    with np.errstate(all='ignore'), pytest.raises(ModelError, match=nowhere):
         after_film_effects(bare, broken, points)
     with pytest.raises(ModelError, match="'sag' gives a reading of inf µm at 441 of 441 points"):
         gauge_reading_um(film_um, broken, points)

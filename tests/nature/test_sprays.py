@@ -1,6 +1,6 @@
 """Campaigns from real sprays of two nozzles: the known cause is named, or nobody.
 
-These are four of the ways in which the sprays make a campaign; `make bench-nature` runs all 52.
+These are six of the ways in which the sprays make a campaign; `make bench-nature` runs all 52.
 """
 
 from pathlib import Path
@@ -53,8 +53,11 @@ def named(diagnosis: pd.Diagnosis) -> list[set[str]]:
     ]
 
 
-def test_of_three_heights_the_spread_is_named_and_nothing_else(diagnosed):
-    found = diagnosed(OTHER)
+@pytest.mark.parametrize(
+    ('nozzle', 'as_repeats'), [(ONE, True), (OTHER, False)], ids=['repeats', 'parts']
+)
+def test_of_three_heights_the_spread_is_named_and_nothing_else(diagnosed, nozzle, as_repeats):
+    found = diagnosed(nozzle, as_repeats=as_repeats)
     assert named(found) == [{'pattern_spread'}]
     assert -0.4 < found.model.effect('pattern_spread').exponent < -0.1
     assert found.history[-1].rmse_um < found.history[0].rmse_um
@@ -73,7 +76,14 @@ def test_of_one_height_nobody_is_blamed(diagnosed, nozzle, height_in, repeats):
         assert 0.005 < found.discrepancy.length_m < 0.1
 
 
-def test_of_two_heights_what_looks_like_the_spread_is_likeliest_and_nothing_else_named(diagnosed):
-    found = diagnosed(OTHER, as_repeats=True, heights_in=(20, 40))
+@pytest.mark.parametrize(
+    ('nozzle', 'options'),
+    [(OTHER, {'heights_in': (20, 40)}), (ONE, {'told_off_m': -0.2 * 30 * SCALE_M_PER_IN})],
+    ids=['two heights', 'heights told wrongly'],
+)
+def test_the_spread_or_what_looks_like_it_is_likeliest_and_nothing_else_named(
+    diagnosed, nozzle, options
+):
+    found = diagnosed(nozzle, as_repeats=True, **options)
     assert set(found.classes[0].members) <= ALIKE
     assert all(group <= ALIKE for group in named(found))

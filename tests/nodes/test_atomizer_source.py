@@ -90,15 +90,16 @@ def stamps_from_now() -> np.ndarray:
     return time.time_ns() + 4_000_000 * np.arange(len(WAY))
 
 
-def test_a_driver_that_returns_another_way_is_heard(source, ros_context, spin, wait_until):
+def test_a_driver_that_returns_another_way_is_heard(source, ros_context, spin, viewer, wait_until):
     node = source()
     for count, quality in ((1, ReliabilityPolicy.RELIABLE), (2, ReliabilityPolicy.BEST_EFFORT)):
         driver = Driver(ros_context, reliability=quality)
         spin(driver)
         wait_until(driver.has_subscribers, what='the source')
         driver.move([START_NS + 4_000_000 * count], rows=WAY[:1])
-        wait_until(lambda n=count: node.poses_published == n, what='its pose')
+        wait_until(lambda n=count: len(viewer.heard['atomizer/pose']) == n, what='its pose')
         driver.destroy_node()
+    assert node.poses_published == 2
 
 
 @pytest.mark.parametrize(('given', 'prefix', 'scale'), [

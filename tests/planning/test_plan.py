@@ -96,7 +96,10 @@ def test_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it_or_run_downward
     [
         ({'speed_m_per_s': None}, 'neither speed_m_per_s nor target_um'),
         ({'tolerance': 0.05, 'index_m': 0.3}, 'on this part within 5 %; the closest is'),
-        ({'tolerance': 0.1, 'index_m': 0.2, 'optimise': True}, r'closest is .* at 0\.200 m'),
+        (
+            {'tolerance': 0.1, 'index_m': 0.2, 'optimise': True},
+            r'within 10 %; the closest is .* at 0\.200 m',
+        ),
         ({'index_m': 0.2, 'index_min_m': 0.25}, 'index_m is 0.2, beyond index_min_m, 0.25'),
         ({'target_um': 2e4, 'speed_m_per_s': None}, 'give another target or index'),
         ({'overspray_m': -0.1}, 'overspray_m is -0.1'),

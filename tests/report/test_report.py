@@ -184,7 +184,7 @@ def test_every_verdict_has_its_report(tell, diagnosis, comparisons, which):
         ('agrees with the readings', 'none_missing', base),
         ('cannot be trusted', 'fit_broken', base | broken),
         ('do not say which', 'undecided', base | {'classes': (drift, fog)}),
-        ('more is, most likely fog gradient (or TCP tilt) (40 %).', 'undecided',
+        ('Something more is, most likely fog gradient (or TCP tilt) (40 %).', 'undecided',
          {'classes': (diagnosis.classes[0], fog)}),
         ('no known effect explains', 'unknown_effect', {}),
     )[which]  # fmt: skip

@@ -142,7 +142,9 @@ def test_the_only_procedure_is_where_it_starts(tmp_path):
 def test_a_list_of_modules_names_files_beside_it(tmp_path):
     for name in ('', '../a.mod', 'in/a.mod'):
         (tmp_path / 'p.pgf').write_text(f'<Program><Module>{name}</Module></Program>')
-        with pytest.raises(RecordingError, match=f"the module '{name}'; name modules that lie"):
+        with pytest.raises(
+            RecordingError, match=f"lists the module '{name}'; name modules that lie"
+        ):
             read_program(tmp_path / 'p.pgf')
 
 
@@ -177,7 +179,8 @@ START = f'MoveL {target(0)},v100,z10,tool0'
 @pytest.mark.parametrize(
     ('body', 'says'),
     [
-        ('FOR i FROM 1 TO n DO\nMoveL p,v1,fine,t;\nENDFOR', 'is inside FOR and depends on n is'),
+        ('FOR i FROM 1 TO n DO\nMoveL p,v1,fine,t;\nENDFOR',
+         'line 4: movel in line 5 is inside FOR and depends on n is not declared'),
         ('WHILE TRUE DO\nPaintL p,v1,fine,t;\nENDWHILE', 'line 4: WHILE never ends; name the'),
         ('WHILE reg1<1 DO\nreg2:=reg2+1;\nENDWHILE', 'line 4: WHILE never ends; name the'),
         ('FOR i FROM 1 TO 1E9 DO\nStop;\nENDFOR', 'line 4: FOR takes 10000 turns or more'),
@@ -198,7 +201,8 @@ START = f'MoveL {target(0)},v100,z10,tool0'
         (f'PaintL {target(1)},v100,bdMain,z10,tBell;', 'line 4: paintl takes bdmain beside'),
         ('UseBrushTab a;\nUseBrushTab b;', 'line 5: the brush table b after a: a number would'),
         ('SetBrush 1\\T:=3;', 'line 4: setbrush with t: give one of X, Y and Z'),
-        (f'MoveExtJ [[0],[0]],v100,fine;{START};', 'line 4: an external axis moves, and the work'),
+        (f'MoveExtJ [[0],[0]],v100,fine;{START};',
+         'line 4: an external axis moves, and the work objects stand still'),
         ('p.trans.z:=7;', 'line 4: p has no such part to assign to'),
         (f'MoveL {target(1)},v100;', 'movel needs a target, a speed, a zone and a tool'),
         (START, "line 5: 'endproc' is not expected here; is a ';' missing before it?"),
@@ -208,7 +212,8 @@ START = f'MoveL {target(0)},v100,z10,tool0'
         (r'MoveAbsJ [[0,0,0,0,0,0],[0,0,0,0,0,0]],v100,fine,tBell;', 'has no moves of the TCP'),
         (f'MoveL {target(1)},v100,fine,tStill;', 'tstill stands still'),
         (rf'{START}\WObj:=wHeld;', 'holds the work object wheld'),
-        (f'{START};'.replace('1,0,0,0', '1,0,0,0.2'), 'line 4: quaternion [1.0, 0.0, 0.0, 0.2]'),
+        (f'{START};'.replace('1,0,0,0', '1,0,0,0.2'),
+         'test.mod line 4: quaternion [1.0, 0.0, 0.0, 0.2] has the norm 1.0198'),
         (rf'{START}\WObj:=wBad;', 'is no position [x, y'),
         (f'MoveL {target("1e400")},v100,z10,tool0;', 'is no position [x, y'),
         ('none:=1/0;', 'line 4: division by zero'),
@@ -218,8 +223,10 @@ START = f'MoveL {target(0)},v100,z10,tool0'
         ('SetBrush 2.5;', 'line 4: setbrush takes the number of a brush, not 2.5'),
         ('TriggIO tr\\DOp:=doGun;', 'triggio needs a number'),
         (f'MoveL {target(0)},v100\\V:=[1],z10,tool0;', 'speed is [1.0]; a number expected'),
-        (f'{START};MoveL {target(9)},v100\\T:=0,z1,tool0;', 'line 4: a duration of 0 s; give one'),
-        (f'MoveL Offs({target(0)},0,0,[1]),v1,z1,tool0;', '[0.0, 0.0, [1.0]] is no displacement;'),
+        (f'{START};MoveL {target(9)},v100\\T:=0,z1,tool0;',
+         'line 4: a duration of 0 s; give one above 0'),
+        (f'MoveL Offs({target(0)},0,0,[1]),v1,z1,tool0;',
+         '[0.0, 0.0, [1.0]] is no displacement; give three numbers'),
     ],
 )  # fmt: skip
 def test_what_cannot_be_followed_is_named(read, body, says):

@@ -120,7 +120,8 @@ DRIVERS = {
     'degrees': ((DEGREES,), {'urdf': 'arm', 'angle_unit': 'deg'}, 'give --angle-unit deg'),
     'rail': ((EGM, RAIL), {'urdf': 'railed'}, 'give urdf'),
     'rail in mm': ((EGM, RAIL_MM), {'urdf': 'railed', 'pose_unit': 'mm'}, ''),
-    'named topics': (BOTH, {'urdf': 'arm', 'pose_topic': '/egm/joint_states'}, '--pose-topic'),
+    'named topics': (BOTH, {'urdf': 'arm', 'pose_topic': '/egm/joint_states'},
+                     '--pose-topic /egm/joint_states'),
     'millimetres': ((MILLIMETRES,), {'pose_unit': 'mm'}, ''),
     'odometry': ((poses('/odom', 'Odometry'),), {}, ''),
     'covariance': ((poses('/pose', 'PoseWithCovarianceStamped'),), {}, ''),
@@ -128,7 +129,8 @@ DRIVERS = {
     'array': ((poses('/poses', 'PoseArray'),), {'pose_topic': '/poses[1]'}, 'as /poses[0]'),
     'abb_libegm': (egm_log, {}, ''),
     'abb_libegm joints': (egm_log, {'urdf': 'arm'}, ''),
-    'abb_motion_program_exec': (program_log, {'urdf': 'arm', 'angle_unit': 'deg'}, '--angle-unit'),
+    'abb_motion_program_exec': (program_log, {'urdf': 'arm', 'angle_unit': 'deg'},
+                                'give --angle-unit deg'),
 }  # fmt: skip
 
 

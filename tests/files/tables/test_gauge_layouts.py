@@ -89,7 +89,9 @@ def test_a_lone_heading_keeps_its_unit(file, heading, mark):
     ],
 )
 def test_readings_in_order_are_refused_if_their_number_is_not_that_of_the_points(file, text):
-    with pytest.raises(ReadingsError, match=r'readings in order for the 6 points .*write n/a'):
+    with pytest.raises(
+        ReadingsError, match=r'readings in order for the 6 points .*; write n/a in'
+    ):
         read_readings(file('b.csv', text), file('points.csv', IN_ORDER))
 
 
@@ -228,7 +230,9 @@ def test_places_on_a_face_are_found_as_the_gun_sees_it(file):
     beside = file('b.csv', 'from left [mm];height [mm];DFT [µm]\n610;50;20\n')
     with pytest.raises(ReadingsError, match=r'line 2: 0\.610 m from the left .* is no surface'):
         read_readings(beside, surface=panel)
-    with pytest.raises(ReadingsError, match=r'are places on a face; .*name the file in a camp'):
+    with pytest.raises(
+        ReadingsError, match=r'are places on a face; .*name the file in a campaign'
+    ):
         read_readings(path)
 
 
@@ -282,10 +286,12 @@ def test_which_rows_are_readings_and_of_which_points(file, text, listed, columns
         ('point;DFT [mm]\n1;24\n', {}, 'is 24000; .* it may be in another unit than is said'),
         ('point;DFT\n1;24 µm\n2;1 mil\n', {}, "DFT is '24 µm'; .* write the one unit in the hea"),
         ('Units;mils\n\npoint;DFT [µm]\n1;24\n', {}, 'thickness is in mil and µm; give all of'),
-        ('Meas. pt,DFT\n2,22\n1,21\n3,23\n4,24\n5,25\n6,26\n', {}, 'columns: {point: Meas. pt}'),
+        ('Meas. pt,DFT\n2,22\n1,21\n3,23\n4,24\n5,25\n6,26\n', {},
+         "the column 'Meas. pt' holds the labels of p.csv .* say columns: {point: Meas. pt}"),
         ('Meas. pt,X [mm],Bake history\nA,1,2\n', {}, "columns: 'Meas. pt', 'X .mm.', 'Bake hist"),
         ('a,x,y,z,DFT\n,m,m,m,ell\nP,0,0,0,1\n', {}, "thickness .*; 'DFT' is in 'ell': give it"),
-        ('Point;Inner thickness;Outer thickness\nA;1;2\n', {}, "'Inner thickness' or 'Outer"),
+        ('Point;Inner thickness;Outer thickness\nA;1;2\n', {},
+         "it may be 'Inner thickness' or 'Outer thickness': name one with columns: {thick"),
     ],
 )  # fmt: skip
 def test_tables_without_places_that_could_mislead_are_refused(file, text, columns, message):

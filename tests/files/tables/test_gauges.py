@@ -116,7 +116,10 @@ def test_columns_of_repeats_and_a_layer_that_is_none_can_be_named(file, points):
 @pytest.mark.parametrize(
     ('text', 'message'),
     [
-        ((LAYOUTS / 'byk.csv').read_text() + 'C;1;90;20\n', "'No.' counts anew in each Checkzone"),
+        (
+            (LAYOUTS / 'byk.csv').read_text() + 'C;1;90;20\n',
+            "'No.' counts anew in each Checkzone; give a column 'point'",
+        ),
         ('No.;DFT\n1;20\n2;21\n1;22\n2;21\n3;20\n', "'No.' counts anew; give a column 'point'"),
         ('Reading;Thickness\n21,5;0,8\n22,5;0,8\n', "'Reading' counts the readings of a DeFelsko"),
         # One label throughout is that of the part, but not one that nearly is a point's.
@@ -135,7 +138,9 @@ def test_a_folder_or_a_zip_with_several_tables_is_refused(tmp_path):
         for name in ('monday', 'tuesday'):
             (folder / f'{name}.csv').write_text('DFT\n1\n')
             package.writestr(f'{name}/door.csv', 'x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
-    with pytest.raises(ReadingsError, match=r'two holds monday\.csv, tuesday\.csv; name the one'):
+    with pytest.raises(
+        ReadingsError, match=r'two holds monday\.csv, tuesday\.csv; name the one with the tab'
+    ):
         read_readings(folder)
     # Files of one name in a zip are not taken for each other.
     with pytest.raises(ReadingsError, match=r'holds monday/door\.csv, tuesday/door\.csv;'):
@@ -238,7 +243,9 @@ REFUSED_CELLS = {
     "'12.5' beside it in line 3 has no heading": [
         ['Dicke', None, None], ['Ort', 'Basis', 'Klar'], ['A1', 12.5, 21.5],
     ],
-    "sheet 'S', row 3: Dicke .* is '#DIV/0!'; expe": [SHEET, FIRST, [*SECOND[:4], '#DIV/0!']],
+    "sheet 'S', row 3: Dicke .* is '#DIV/0!'; expected .* or n/a where": [
+        SHEET, FIRST, [*SECOND[:4], '#DIV/0!'],
+    ],
     "sheet 'S', row 3: X .* is ''": [SHEET, ['A1', 100, 0, 50, 21.5], [None] * 4 + [21.5]],
 }  # fmt: skip
 

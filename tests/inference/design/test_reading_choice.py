@@ -93,7 +93,7 @@ def test_a_part_without_paint_and_impossible_wishes_are_refused():
     aside = part.path.with_(position_m=np.add(part.path.position_m, [0.0, 0.0, 5.0]))
     with pytest.raises(ReadingsError, match='no paint lands'):
         choose(replace(part, path=aside), 12)
-    for wish, foot_m, words in (((4, 0), 0.015, '12 to 400'), ((20, 21), 0.015, 'for 0 to 20'),
+    for wish, foot_m, words in (((4, 0), 0.015, '12 to 400'), ((20, 21), 0.015, 'ask for 0 to 20'),
                                 ((300, 0), 0.6, 'room for 0')):  # fmt: skip
         with pytest.raises(ReadingsError, match=words):
             choose(part, *wish, foot_m=foot_m)

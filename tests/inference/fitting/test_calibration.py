@@ -123,15 +123,19 @@ def in_unit(panel, factor, rows=slice(None)):
 @pytest.mark.parametrize(
     ('made', 'words'),
     [
-        (lambda panel: with_film(panel, panel.means.mean_um[:6]), 'readings at 6 points; .* meas'),
-        (lambda _: painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)), 'one side of the'),
+        (lambda panel: with_film(panel, panel.means.mean_um[:6]),
+         'readings at 6 points; .* measure at least 10'),
+        (lambda _: painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)),
+         'one side of the passes'),
         (lambda panel: with_film(panel, np.full(40, 20.0), 2, noise_um=0.7), 'no pattern in it'),
         (lambda panel: with_film(panel, np.where(np.arange(40) == 7, -4.5, panel.means.mean_um)),
          "point 'P7' reads -4.5 µm; .* zero the gauge"),
         (lambda panel: in_unit(panel, 25.4), 'look like mil, say unit: {thickness: mil}'),
         (lambda panel: in_unit(panel, 1000.0), 'look like mm, say unit: {thickness: mm}'),
-        (lambda panel: in_unit(panel, 25.4, SIX), r'6 of .* like mil, multiply them by 25\.4'),
-        (lambda panel: in_unit(panel, 1000.0, SIX), '6 of .* like mm, multiply them by 1000'),
+        (lambda panel: in_unit(panel, 25.4, SIX),
+         r"6 of the readings in 'thickness_um'.* look like mil, multiply them by 25\.4 or"),
+        (lambda panel: in_unit(panel, 1000.0, SIX),
+         '6 of the readings.* look like mm, multiply them by 1000'),
     ],
     ids=['few', 'one side', 'even', 'negative', 'mils', 'mm', 'six in mils', 'six in mm'],
 )  # fmt: skip

@@ -71,7 +71,7 @@ def test_latched_messages_and_changed_parameters_are_recorded(record, start, cel
     # Not byte by byte: what pads a message is left as it was in memory.
     assert deserialize_message(data, ThicknessStats) == ThicknessStats(mean_um=41.5)
     with open_bag(recorder.run.folder) as bag:
-        *_, event = (event for _, _, event in bag.decoded(['/parameter_events']))
+        (event,) = (event for _, _, event in bag.decoded(['/parameter_events']))
     (change,) = event.changed_parameters
     told = event.node, change.name, change.value.double_value
     assert told == ('/index_planner', 'width_m', 0.75)

@@ -177,7 +177,7 @@ def test_a_further_coat_lies_on_the_first(simulated, painted, change, tmp_path):
     source.send(MOTION)
     once = painted(node, len(MOTION))
     assert "serial 'A-1' is the part in the cell: set coat: true" in change(serial='A-1').message
-    assert "the part in the cell is 'A-1' of " in change(serial='A-2', coat=True).message
+    assert "coat: the part in the cell is 'A-1' of " in change(serial='A-2', coat=True).message
     same_mesh = node.mesh_file.replace('/panel', '/../' + tmp_path.name + '/panel')
     coat = change(serial='A-1', coat=True, mesh_file=same_mesh)
     assert (coat.success, coat.run) == (True, 'A-1_coat_2'), coat.message

@@ -84,7 +84,10 @@ def test_what_does_not_go_together_is_refused(simulator, tmp_path):
     one_film = r'robot_1 and robot_2 differ in what acts on the finished film.*\(sag\)'
     for values, words in (
         ({'model_files': [thin]}, 'model_files names 1 models for 2 atomizers: give'),
-        ({'model_files': [thin, thin], 'model_file': thin}, 'another: give model_file'),
+        (
+            {'model_files': [thin, thin], 'model_file': thin},
+            'atomizers and model_file another: give model_file',
+        ),
         ({'model_files': [thin, sagging]}, one_film),
         ({'atomizers': ['robot_1', 'robot_1']}, r'atomizers is .*give different names'),
         ({'atomizers': ['../robot']}, r'atomizers is .*give different names'),

@@ -97,8 +97,10 @@ def test_a_model_that_a_peer_sets_runs_and_reads_no_file(simulator, tmp_path, tm
     with pytest.raises(ModelError) as refused:
         simulator(model_file=str(own))
     refusal = str(refused.value)
-    assert refusal.startswith(f'{own}: effect file {tmp_path}/own.py is not run, because it is P')
-    assert refusal.endswith('start the node with allow_user_effects:=true')
+    assert refusal == (
+        f'{own}: effect file {tmp_path}/own.py is not run, because it is Python code; if you '
+        'trust it, start the node with allow_user_effects:=true'
+    )
     node = simulator()
 
     def told(**values) -> str:
