@@ -142,6 +142,8 @@ FACTOR_OF_PLACE = 0.1
 WORTH_LEARNING = 6.0
 # Their lengths of correlation: over a covariate in its standard deviations, over the part [m].
 LENGTHS = {'covariate': (0.35, 1.0), PLACE: (0.1, 0.25)}
+# Effects with what each changes of the readings (P,) [um].
+Changes = list[tuple[Effect, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -234,7 +236,7 @@ def of_corrections(study: Study, fit: Fit, names: frozenset[str]) -> list[Explan
     """
     return [
         replace(of_random(study, curve.centred), corrects=effect.id)
-        for effect, _, curve in _laws_off(study, fit, names, fit.model)
+        for effect, _, curve in _laws_off(study, fit, _changes(study, fit, names), fit.model)
         if curve and study.has(type(effect)).all() and not fit.model.effect(curve.basis.law.id)
     ]
 
@@ -258,9 +260,7 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str], model: DepositionMo
         kept: ids of the effects.
         model: whose rays say over which values of the covariates; one like it.
     """
-    off = [columns for _, columns, _ in _laws_off(study, fit, kept, model)]
-    off += _off_anywhere(study, fit, kept, model, OTHER_ERROR, own=False)
-    return _over_noise(study, off)
+    return _law_errors(study, fit, _changes(study, fit, kept), model)
 
 
 def ways_off(
@@ -271,11 +271,19 @@ def ways_off(
     Returns:
         Of each way the directions (P, n) over the noise, and its prior share.
     """
-    errors = law_errors(study, fit, kept, model)
+    changes = _changes(study, fit, kept)
+    errors = _law_errors(study, fit, changes, model)
     if not errors.any():
         return [(errors, 1.0)]
-    other = _over_noise(study, _off_anywhere(study, fit, kept, model, OTHER_LAW, own=True))
+    other = _over_noise(study, _off_anywhere(study, fit, changes, model, OTHER_LAW, own=True))
     return [*((times * errors, share) for times, share in LAWS_OFF), (other, ANOTHER_FORM)]
+
+
+def _law_errors(study: Study, fit: Fit, changes: Changes, model: DepositionModel) -> np.ndarray:
+    """As ``law_errors``, of effects with these changes of the readings."""
+    off = [columns for _, columns, _ in _laws_off(study, fit, changes, model)]
+    off += _off_anywhere(study, fit, changes, model, OTHER_ERROR, own=False)
+    return _over_noise(study, off)
 
 
 def _over_noise(study: Study, columns_um: Iterable[np.ndarray]) -> np.ndarray:
@@ -284,7 +292,7 @@ def _over_noise(study: Study, columns_um: Iterable[np.ndarray]) -> np.ndarray:
 
 
 def _off_anywhere(
-    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel, size: float, own: bool
+    study: Study, fit: Fit, changes: Changes, model: DepositionModel, size: float, own: bool
 ) -> Iterator[np.ndarray]:
     """(P, n) what laws may be off by, relative to their change of the film [um].
 
@@ -292,7 +300,7 @@ def _off_anywhere(
     pattern would follow, lest an effect that acts on all film stand for anything.
     """
     covariates = standardised(study, model)
-    for effect, change in _changes(study, fit, kept):
+    for effect, change in changes:
         if not own:
             change = _beyond_pattern(study, fit, change)
         over = [name for name in covariates if (name in effect.covariates) == own]
@@ -310,13 +318,14 @@ def standardised(study: Study, model: DepositionModel) -> dict[str, np.ndarray]:
     }
 
 
-def _changes(study: Study, fit: Fit, kept: frozenset[str]) -> Iterator[tuple[Effect, np.ndarray]]:
-    """Effects whose law may be off, with the change of the readings (P,) by each [um]."""
-    film = study.forward.predict_um(fit.model)
+def _changes(study: Study, fit: Fit, kept: frozenset[str]) -> Changes:
+    """What the effects change whose laws may be off."""
+    film, found = study.forward.predict_um(fit.model), []
     for effect in (e for e in fit.model.effects if e.id in kept and not e.exact):
         others = tuple(e for e in fit.model.effects if e.id != effect.id)
         without = fit.model.model_copy(update={'effects': others})
-        yield effect, film - study.forward.predict_um(without)
+        found.append((effect, film - study.forward.predict_um(without)))
+    return found
 
 
 def _beyond_pattern(study: Study, fit: Fit, change_um: np.ndarray) -> np.ndarray:
@@ -336,11 +345,11 @@ def _beyond_pattern(study: Study, fit: Fit, change_um: np.ndarray) -> np.ndarray
 
 
 def _laws_off(
-    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
+    study: Study, fit: Fit, changes: Changes, model: DepositionModel
 ) -> Iterator[tuple[Effect, np.ndarray, RandomLaw | None]]:
     """Effects, by what their laws may be off over a covariate (P, n) [um], and as a curve."""
     covariates, film = standardised(study, model), study.forward.predict_um(fit.model)
-    for effect, change in _changes(study, fit, kept):
+    for effect, change in changes:
         own = [name for name in effect.covariates if name in covariates]
         scale = LAW_ERROR / np.sqrt(max(len(own), 1))
         for name in own:
