@@ -123,11 +123,15 @@ def test_errors_of_several_effects_are_independent(study):
     np.testing.assert_allclose(both, sum(each), atol=1e-9 * both.max())
 
 
-def test_where_an_effect_was_off_or_no_paint_lands_its_law_has_no_error(monkeypatch):
-    """On the back of a plate the model predicts exactly 0."""
-    monkeypatch.setattr(type(EDGE), 'needs', 'voltage')
+@pytest.fixture(scope='module')
+def doors() -> Study:
+    """Two doors, the second painted without voltage."""
     off = on_door(switched_off=frozenset(['voltage']))
-    doors = study_of(on_door(), replace(off, name='without voltage'))
+    return study_of(on_door(), replace(off, name='without voltage'))
+
+
+def test_where_an_effect_was_off_or_no_paint_lands_its_law_has_no_error(doors):
+    """On the back of a plate the model predicts exactly 0."""
     plate = study_of(plate_with_a_back())
     bare = plate.forward.predict_um(MODEL) == 0.0
     for study, none in ((doors, doors.campaign.experiment_of == 1), (plate, bare)):
@@ -135,6 +139,21 @@ def test_where_an_effect_was_off_or_no_paint_lands_its_law_has_no_error(monkeypa
         assert none.any()
         assert found[~none].max() > 0.05
         assert found[none] == pytest.approx(0.0)
+
+
+def test_the_correction_of_a_law_acts_where_its_effect_does(doors):
+    effect, off = EFFECTS['convex_attraction'](gain=0.3), doors.campaign.experiment_of == 1
+    free = FreeParameters.of(model := MODEL.with_effect(effect))
+    fit = doors.beside(free, free.encode(model))
+    (curve,) = explanations.of_corrections(doors, fit, frozenset([effect.id]))
+    assert size(curve.columns)[~off].max() > 0.1
+    assert not curve.columns[off].any()
+    law = curve.random.learned(np.ones(curve.columns.shape[1]))
+    with_it = model.with_effect(law)
+    more_um = doors.forward.predict_um(with_it) - doors.forward.predict_um(model)
+    assert np.abs(more_um[~off]).max() > 0.1
+    assert not more_um[off].any()
+    assert with_it.without(frozenset(['voltage'])).effect(law.id).is_neutral
 
 
 def test_laws_of_any_form_leave_the_film_as_a_whole_as_it_is(study):

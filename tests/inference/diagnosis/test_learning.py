@@ -115,12 +115,13 @@ def test_a_law_that_improves_one_part_only_is_not_chosen_by_that_part():
 
 
 @pytest.mark.slow
-def test_a_fold_that_calls_for_another_set_goes_no_further():
+def test_a_fold_that_calls_for_another_set_goes_no_further(monkeypatch):
     """Only one part had the voltage that the effect needs: from the others it is not known."""
     one, *others = gauged(BASE, seed=0, orders=THREE).experiments
     with_edge = gauged(BASE.with_effect(EDGE), seed=0, orders=THREE[:1]).experiments[0]
     off = frozenset(['voltage'])
     parts = replace(with_edge, name=one.name), *(replace(e, switched_off=off) for e in others)
+    monkeypatch.setattr(Study, 'leaves_out_parts', True)
     state = begun(pd.Campaign(parts), 'edge_build', 'flow_drift')
     study, stages = state.study, Search(state).stages()
     first, last = stages[0].here, stages[-1].here

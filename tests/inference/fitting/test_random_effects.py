@@ -83,8 +83,8 @@ def test_a_part_without_voltage_has_a_level_of_its_own():
     np.testing.assert_allclose(other, np.where(rows, share, 0.0))
     double = study.residuals(study.measured_um * np.where(rows, 2.0, 1.0))
     np.testing.assert_allclose(double.predicted_um, study.measured_um, rtol=0.02)
-    assert study.has(EFFECTS['convex_attraction']).tolist() == (~rows).tolist()
-    assert study.has(EFFECTS['sag']).all()
+    assert study.has('voltage').tolist() == (~rows).tolist()
+    assert study.has('').all()
 
 
 def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves():
@@ -158,10 +158,9 @@ def test_a_level_that_no_other_part_tells_is_no_error_on_a_part_left_out():
     expected = np.sqrt((squares + np.sum(~usual) * anew**2) / len(study))
     assert found == pytest.approx(expected, rel=0.03)
     assert anew < 0.1 * np.mean(study.measured_um[~usual])
-    # Two parts of which one is such: neither tells the level of the other.
-    study, fit = clean_and_fit(pd.Campaign((first, off)), BASE, starts=6)
-    found = study.errors_left_out_um(lambda out: study.predicted_without_um(fit, out))
-    assert found < 0.1 * np.mean(study.measured_um)
+    # What acts with the voltage only is not known without the one part that had it.
+    assert study.leaves_out_parts
+    assert not study_of(first, off).leaves_out_parts
 
 
 def test_readings_left_out_have_no_part_in_what_is_predicted_and_a_fitted_direction_has():

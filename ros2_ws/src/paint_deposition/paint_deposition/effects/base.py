@@ -148,6 +148,10 @@ class Effect(BaseModel):
         """Whether it defines one of these places where effects act."""
         return any(getattr(cls, place) is not getattr(Effect, place) for place in places)
 
+    def is_off(self, switched_off: frozenset[str]) -> bool:
+        """Whether the cell has switched off what the effect needs."""
+        return self.needs in switched_off
+
     @property
     def absent(self) -> 'Effect':
         """The effect with all its amplitudes neutral."""

@@ -176,7 +176,7 @@ class DepositionModel(BaseModel):
         """A copy in which the effects that need one of these of the cell are absent."""
         if not switched_off:
             return self
-        left = tuple(e.absent if e.needs in switched_off else e for e in self.effects)
+        left = tuple(e.absent if e.is_off(switched_off) else e for e in self.effects)
         return self.model_copy(update={'effects': left})
 
     def with_effect(self, effect: Effect) -> 'DepositionModel':

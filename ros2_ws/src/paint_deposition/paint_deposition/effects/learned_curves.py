@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from types import new_class
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 from numba.extending import register_jitable
@@ -29,6 +29,9 @@ class LearnedCurve(LearnedLaw):
     sd: tuple[float, ...] = Field(
         (), description='a list of numbers: standard deviations of h at the knots; [] if not known'
     )
+    acts_with: Literal['', 'voltage', 'draught'] = Field(
+        '', description='what of the cell must be on for the law to act; nothing: it always does'
+    )
 
     @staticmethod
     def axis(value: Any) -> Any:
@@ -52,6 +55,9 @@ class LearnedCurve(LearnedLaw):
     @classmethod
     def typical(cls) -> 'LearnedCurve':
         return cls(learned=(0.0, 0.1))
+
+    def is_off(self, switched_off: frozenset[str]) -> bool:
+        return self.acts_with in switched_off
 
     @property
     def knots(self) -> np.ndarray:

@@ -60,6 +60,10 @@ class LearnedLaw(Effect):
     def is_neutral(self) -> bool:
         return not any(self.learned)
 
+    @property
+    def absent(self) -> 'LearnedLaw':
+        return self.model_copy(update={'learned': (0.0,) * len(self.learned)})
+
 
 def hat_weights(position: np.ndarray, count: int) -> np.ndarray:
     """(..., count) weights of knots 0 to count - 1 at positions (...) among them.

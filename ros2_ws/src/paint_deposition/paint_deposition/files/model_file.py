@@ -258,8 +258,9 @@ def _with_rows(value: Any) -> Any:
 def _effect_text(effect: Effect, folder: Path) -> CommentedMap:
     if isinstance(effect, LearnedLaw):
         text = _fields(effect, id=LEARNED_ID, covariate=effect.covariate)
-        if not text.get('sd'):
-            text.pop('sd', None)
+        for name in ('sd', 'acts_with'):
+            if not text.get(name):
+                text.pop(name, None)
         for name in {'learned', 'sd'} & text.keys():
             text[name] = _with_rows(text[name])
         about = f'{effect.over} [{effect.unit}]'

@@ -232,12 +232,12 @@ def of_corrections(study: Study, fit: Fit, names: frozenset[str]) -> list[Explan
     """Curves over their own covariates by which the laws of effects in a model may be off.
 
     Args:
-        names: ids of the effects. One that a part lacks has no such curve: curves act on all.
+        names: ids of the effects.
     """
     return [
         replace(of_random(study, curve.centred), corrects=effect.id)
         for effect, _, curve in _laws_off(study, fit, _changes(study, fit, names), fit.model)
-        if curve and study.has(type(effect)).all() and not fit.model.effect(curve.basis.law.id)
+        if curve and not fit.model.effect(curve.basis.law.id)
     ]
 
 
@@ -353,15 +353,17 @@ def _laws_off(
         own = [name for name in effect.covariates if name in covariates]
         scale = LAW_ERROR / np.sqrt(max(len(own), 1))
         for name in own:
-            curves = effect.free_law and name in CURVES
-            if basis := curve_basis(study, model, name, effect.free_law) if curves else None:
+            basis = None
+            if effect.free_law and name in CURVES:
+                basis = curve_basis(study, model, name, effect.free_law, effect.needs)
+            if basis:
                 relative = change
                 if effect.free_law != 'addition':
                     relative = np.divide(change, film, out=np.zeros_like(film), where=film > 0.0)
                 # The size of an effect is what it changes at this share of the points at the most.
                 size = scale * float(np.quantile(np.abs(relative), 0.95))
                 curve = basis.random(size, LAW_LENGTH)
-                yield effect, study.has(type(effect))[:, np.newaxis] * curve.change_um, curve
+                yield effect, curve.change_um, curve
             else:
                 root = root_of_field(covariates[name], LAW_LENGTH, NEGLIGIBLE)
                 yield effect, scale * change[:, np.newaxis] * root, None

@@ -90,8 +90,9 @@ class RandomLaw:
 
     def around(self, study: Study, model: DepositionModel) -> 'RandomLaw':
         """The random law where another model says what arrives where."""
-        bases = bases_over(study, model, self.basis.law, self.basis.settings.get('kind', ''))
-        maps = self.basis.settings.get('maps')
+        settings = self.basis.settings
+        kind, needs = settings.get('kind', ''), settings.get('acts_with', '')
+        bases, maps = bases_over(study, model, self.basis.law, kind, needs), settings.get('maps')
         (basis,) = (basis for basis in bases if basis.settings.get('maps') == maps)
         return replace(self, basis=basis)
 
@@ -120,19 +121,19 @@ class RandomLaw:
 
 
 def bases_over(
-    study: Study, model: DepositionModel, law: type[LearnedLaw], kind: str
+    study: Study, model: DepositionModel, law: type[LearnedLaw], kind: str, needs: str = ''
 ) -> list[Basis]:
     """Laws over any covariate; none where it does not vary."""
     if law is LearnedFootprint:
         return [footprint_basis(study, model)]
     if law is LearnedMap:
         return map_bases(study, model, kind)
-    basis = curve_basis(study, model, law.covariate, kind)
+    basis = curve_basis(study, model, law.covariate, kind, needs)
     return [basis] if basis else []
 
 
 def curve_basis(
-    study: Study, model: DepositionModel, covariate: str, kind: str = 'factor'
+    study: Study, model: DepositionModel, covariate: str, kind: str = 'factor', needs: str = ''
 ) -> Basis | None:
     """Curves over a covariate; None where it does not vary.
 
@@ -142,6 +143,7 @@ def curve_basis(
         model: whose rays and pattern say what arrives where.
         covariate: one that a learned curve can have.
         kind: 'factor' on what arrives, or 'addition' to the film.
+        needs: of the cell; on parts where this was switched off the curves do not act.
     """
     law = CURVES[covariate]
     knots = TIME_KNOTS if covariate == 'time_s' else KNOTS
@@ -163,8 +165,9 @@ def curve_basis(
     step = (law.axis(high) - law.axis(low)) / (knots - 1)
     step /= max(float(np.std(np.concatenate(positions))), 1e-9)
     places = step * np.arange(knots)[:, np.newaxis]
-    settings = {'kind': kind, 'low': low, 'high': high}
-    return Basis(law, settings, np.vstack(films), places, step)
+    settings = {'kind': kind, 'low': low, 'high': high, 'acts_with': needs}
+    change = study.has(needs)[:, np.newaxis] * np.vstack(films)
+    return Basis(law, settings, change, places, step)
 
 
 def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> list[Basis]:

@@ -225,7 +225,7 @@ class Diagnosis(Tabular):
     @property
     def left_out(self) -> str:
         """What is left out in turn for the error that was not fitted: parts or patches."""
-        return 'parts' if len(self.study.campaign.experiments) > 1 else 'patches'
+        return 'parts' if self.study.leaves_out_parts else 'patches'
 
     @cached_property
     def worse(self) -> tuple[str, ...]:

@@ -92,19 +92,13 @@ def random_effects(
     return tuple(effects for effects in (level, zero) if effects.mixing.any())
 
 
-def levels_untold(
-    campaign: Campaign, film_um: np.ndarray, sigma_um: np.ndarray, used: np.ndarray
-) -> np.ndarray:
-    """(P, n) directions of the levels that the points used, (P,) bool, say nothing of.
+def levels_untold(campaign: Campaign, film_um: np.ndarray, sigma_um: np.ndarray) -> np.ndarray:
+    """(P, n) directions of the levels that no other part tells: of those with something off.
 
-    Those of parts painted with something off, and that of the others if only such parts are used;
-    of a film (P,) that may be off by more than a little, unlike the one that was measured.
+    Of a film (P,) that may be off by more than a little, unlike the one that was measured.
     """
     part_of, off = _parts(campaign)
-    levels = part_of[:, off]
-    if not part_of[used][:, ~off].any():
-        levels = np.column_stack([levels, part_of[:, ~off].any(axis=1)])
-    return OTHER_LEVEL_SHARE * levels * (film_um / sigma_um)[:, np.newaxis]
+    return OTHER_LEVEL_SHARE * part_of[:, off] * (film_um / sigma_um)[:, np.newaxis]
 
 
 def _parts(campaign: Campaign) -> tuple[np.ndarray, np.ndarray]:

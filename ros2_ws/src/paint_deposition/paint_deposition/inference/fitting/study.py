@@ -267,7 +267,7 @@ class Study:
 
     def _errors_um(self, film_um: np.ndarray, out: np.ndarray) -> np.ndarray:
         """(P,) errors of a film (P,) on points left out, beside levels untold; 0 elsewhere."""
-        levels = levels_untold(self.campaign, film_um, self.sigma_um, ~out)[out]
+        levels = levels_untold(self.campaign, film_um, self.sigma_um)[out]
         errors_um = np.zeros(len(self))
         misfit = ((self.measured_um - film_um) / self.sigma_um)[out]
         errors_um[out] = self.sigma_um[out] * _beside(levels, misfit)
@@ -291,9 +291,9 @@ class Study:
                 )
         return tuple(found)
 
-    def has(self, effect: type[Effect]) -> np.ndarray:
-        """(P,) bool, whether the cell had what an effect needs switched on."""
-        parts = [effect.needs not in e.switched_off for e in self.campaign.experiments]
+    def has(self, setting: str) -> np.ndarray:
+        """(P,) bool, whether the cell had a setting that an effect needs switched on."""
+        parts = [setting not in e.switched_off for e in self.campaign.experiments]
         return np.array(parts)[self.campaign.experiment_of]
 
     def rays(self, model: DepositionModel) -> list[Rays]:
@@ -309,13 +309,19 @@ class Study:
         parts = [rays.covariates for rays in self.rays(model)]
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
-    def folds(self) -> np.ndarray:
-        """(P,) number of the fold in which each point is left out.
+    @property
+    def leaves_out_parts(self) -> bool:
+        """Whether whole parts are left out in turn for the error that was not fitted, or patches.
 
-        Whole parts where there are several, else patches of the one part.
+        Parts need another one that was painted with everything switched on: what acts with the
+        voltage only cannot be predicted from parts without it.
         """
-        several = len(self.campaign.experiments) > 1
-        return self.campaign.experiment_of % FOLDS if several else self.patches()
+        return sum(not e.switched_off for e in self.campaign.experiments) > 1
+
+    def folds(self) -> np.ndarray:
+        """(P,) number of the fold in which each point is left out, with its part or its patch."""
+        owner = self.campaign.experiment_of
+        return owner % FOLDS if self.leaves_out_parts else self.patches()
 
     def patches(self) -> np.ndarray:
         """(P,) number of the patch of its part in which each point lies."""
