@@ -100,18 +100,15 @@ def test_each_effect_of_the_set_is_sure_and_one_that_does_not_stand_is_taken_out
     for name, (members, probability) in groups.items():
         assert members == (name,)
         assert probability > model_space.SURE
-        # Against the set without it, as it is or with something unknown beside it. The other
-        # effect is accepted: the evidence counts for less, the prior does not.
+        # Against the set without it, as it is or with something unknown beside it.
         others = search.without(trial, name)
         rivals = dict.fromkeys((name, *others.proposed))
-        priors = model_space.PRIOR_EFFECT, model_space.PRIOR_UNKNOWN
-        effect, unknown = map(model_space.log_odds, priors)
         gains = [search.with_effect(others, rival).log_evidence for rival in rivals]
-        odds = (np.array(gains) - others.log_evidence) / model_space.COARSENED + effect
-        gain = others.of_unknown.alone[UNKNOWN] - unknown
+        effect = model_space.log_odds(model_space.PRIOR_EFFECT)
+        odds = np.array(gains) - others.log_evidence + effect
         # What is unknown may also look just like them.
         alike = logsumexp(odds) + np.log(ALIKE)
-        shares = softmax([*odds, 0.0, gain / model_space.COARSENED + unknown, alike])
+        shares = softmax([*odds, 0.0, others.of_unknown.alone[UNKNOWN], alike])
         assert probability == pytest.approx(shares[:-3].sum())
 
 

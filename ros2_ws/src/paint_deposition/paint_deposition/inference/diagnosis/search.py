@@ -28,7 +28,6 @@ from paint_deposition.inference.diagnosis.model_space import (
     COARSENED,
     CREDIBLE,
     PRIOR_EFFECT,
-    PRIOR_UNKNOWN,
     SURE,
     ModelSpace,
     WeightedNull,
@@ -373,13 +372,8 @@ class Search:
 
     def _log_odds(self, trial: EffectSet, larger: Mapping[str, EffectSet]) -> dict[str, float]:
         """Logarithm of the odds of each larger set against one, and of something unknown in it."""
-        # Beside an accepted effect, whose law is no truer than that, evidence counts for less.
-        scale = COARSENED if trial.names else 1.0
-        effect, unknown = log_odds(PRIOR_EFFECT), log_odds(PRIOR_UNKNOWN)
-        found = {
-            name: (one.log_evidence - trial.log_evidence) / scale + effect
-            for name, one in larger.items()
-        }
-        beyond = (trial.of_unknown.alone[UNKNOWN] - unknown) / scale + unknown
+        effect = log_odds(PRIOR_EFFECT) - trial.log_evidence
+        found = {name: one.log_evidence + effect for name, one in larger.items()}
+        beyond = trial.of_unknown.alone[UNKNOWN]
         alike = np.logaddexp.reduce([*found.values(), -np.inf]) + np.log(ALIKE)
         return found | {UNKNOWN: float(np.logaddexp(beyond, alike))}
