@@ -19,7 +19,7 @@ from tests.virtual_paint_shop.truths import choose
 
 from paint_deposition.inference.diagnosis.verdict import percent
 
-SEED, HIDDEN, SCALE = 930700, 'faraday_shielding', 2.0
+SEED, HIDDEN, SCALE = 930101, 'gauge_curvature_bias', 2.0
 PARCELS = 4_000_000
 
 Paint = Callable[..., str]
