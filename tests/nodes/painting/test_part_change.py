@@ -336,7 +336,7 @@ def test_poses_that_wait_are_of_their_part(simulator, robot, painted, asked, wai
     wait_until(lambda: node.parts.waiting, what='the request')
     source.send(later(MOTION))
     if placed:
-        node.frame.take_part_pose('cell', [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        node.frame.tree.place('part', 'cell', [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     wait_until(future.done, what='the change')
     answer = future.result()
     assert answer.success, answer.message

@@ -80,17 +80,15 @@ class ModelComparison(PaintingNode):
         super()._load_files()
 
     def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
-        def experiment_on(surface: Surface) -> Experiment:
-            return Experiment.of('live', surface, SprayPath.empty(), self.readings)
-
+        motionless = SprayPath.empty()
         try:
-            self._experiment = experiment_on(surface)
+            self._experiment = Experiment.of('live', surface, motionless, self.readings)
         except ReadingsError:
             # Until the gun tells which side of an open sheet is outward, readings with normals do.
             if self._is_read:
                 raise
             surface = turned(surface)
-            self._experiment = experiment_on(surface)
+            self._experiment = Experiment.of('live', surface, motionless, self.readings)
         self._is_read = True
         return surface, self._experiment.points
 

@@ -1,6 +1,5 @@
 """Tables of node parameters, from which they are declared, described and validated."""
 
-import contextlib
 import math
 import os
 import re
@@ -233,7 +232,7 @@ def fixed(because: str, fixed_while: str = RUNS, /, **rows: NodeParameter) -> Pa
 
 
 def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
-    """Declare every row on `node`, validate all later changes, and return the values.
+    """Declare every row on `node`, and return the values.
 
     Raises PaintError for an override that is invalid or that no row has; it names the nearest.
     """
@@ -244,9 +243,6 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
         if not name.startswith('qos_overrides.'):
             remedy = did_you_mean(name, table)
             raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
-    node.add_pre_set_parameters_callback(
-        lambda changes: [_typed(table.get(change.name), change) for change in changes]
-    )
     for name, row in table.items():
         try:
             value = row.checked(name, overrides.get(name, row.default))
@@ -259,18 +255,9 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
         writable = row.descriptor()
         writable.read_only = False
         node.declare_parameter(name, row.ros_type, writable, ignore_override=True)
-        node.set_parameters([Parameter(name, row.ros_type, [])])
+        Node.set_parameters(node, [Parameter(name, row.ros_type, [])])
         node.set_descriptor(name, row.descriptor())
     return {name: node.get_parameter(name).value for name in table}
-
-
-def _typed(row: NodeParameter | None, change: Parameter) -> Parameter:
-    """The change with its value in the type of the row; one that is invalid as it is."""
-    with contextlib.suppress(PaintError):
-        if row is not None:
-            value = row.checked(change.name, change.value)
-            return Parameter(change.name, row.ros_type, value)
-    return change
 
 
 def require_file_name(what: str, name: str) -> None:

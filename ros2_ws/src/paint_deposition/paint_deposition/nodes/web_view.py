@@ -212,7 +212,7 @@ class WebView(PaintNode):
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
         for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
-            self._frame.take_part_pose(parent, pose)
+            self._frame.tree.place(self._frame.frame_id, parent, pose)
 
     def _take_state(self, gun: str, state: AtomizerState, _info: Any) -> None:
         with contextlib.suppress(PaintError):  # the simulator, which refuses it, says so

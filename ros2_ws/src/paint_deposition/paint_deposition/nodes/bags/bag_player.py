@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from heapq import merge
 from itertools import groupby
@@ -146,12 +146,16 @@ class BagPlayer(PaintNode):
             else:
                 self._motion = motion_of(bag, *motion)
             self._state_topic: BagTopic | None = None
+            self._states_are_current = False
             unused = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
             if values['state_topic']:
                 self._state_topic = choose_state_topic(bag, values['state_topic'])
                 if self._state_topic.type == BOOL_TYPE:
                     # Raises an error unless recorder and robot had the same clock.
                     trajectory_of(bag, motion[0], values['state_topic'], *motion[1:])
+                else:
+                    today = definitions.installed(STATE_TYPE).type_hash
+                    self._states_are_current = bag.type_hash(self._state_topic) == today
             elif unused:
                 self.get_logger().info(
                     f'no state_topic: the gun always sprays; the bag has {" ".join(unused)}'
@@ -220,7 +224,6 @@ class BagPlayer(PaintNode):
     def _play_once(self) -> None:
         begun = False
         with open_bag(self.values['bag']) as bag:
-            as_state = state_converter(bag, self._state_topic)
             for message in self._messages(bag):
                 if not begun:
                     begun = True
@@ -235,7 +238,7 @@ class BagPlayer(PaintNode):
                     self._time.change(time_ns=message.log_time_ns)
                 if self.stopped.is_set():
                     return
-                self._publish(message, as_state)
+                self._publish(message, bag)
         self._time.change(started=False)
         self._publish_clock()
 
@@ -259,7 +262,7 @@ class BagPlayer(PaintNode):
         for _, simultaneous in groupby(messages, key=log_time):
             yield from sorted(simultaneous, key=lambda each: each.topic == self._pose_topic)
 
-    def _publish(self, message: RawMessage, as_state: Callable[[RawMessage], bytes]) -> None:
+    def _publish(self, message: RawMessage, bag: Bag) -> None:
         if message.topic == self._pose_topic:
             self._flow_control.add_sent(header_stamp_ns(message.cdr), time.monotonic())
             self._pose_publisher.publish(message.cdr)
@@ -271,26 +274,15 @@ class BagPlayer(PaintNode):
         elif message.topic in self._transform_topics:
             self._transform_publishers[message.topic.endswith(STATIC)].publish(message.cdr)
         else:
-            self._state_publisher.publish(as_state(message))
+            self._state_publisher.publish(self._state_of(message, bag))
             self.states_published += 1
 
-    def _publish_clock(self) -> None:
-        with self._clock_order:
-            time_ns = self._time.time_ns
-            if self._clock_publisher and time_ns is not None:
-                self._clock_publisher.publish(Clock(clock=Time(nanoseconds=time_ns).to_msg()))
-
-
-def state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:
-    """What makes the bytes of an AtomizerState from a recorded Bool or state."""
-    is_bool = states is None or states.type == BOOL_TYPE
-    own_hash = definitions.installed(STATE_TYPE).type_hash
-    if states is not None and not is_bool and bag.type_hash(states) == own_hash:
-        return lambda message: message.cdr
-
-    def as_state(message: RawMessage) -> bytes:
+    def _state_of(self, message: RawMessage, bag: Bag) -> bytes:
+        """The bytes of an AtomizerState from a recorded Bool or state."""
+        if self._states_are_current:
+            return message.cdr
         state = unknown_state()
-        if is_bool:
+        if message.type == BOOL_TYPE:
             state.header = header('', message.log_time_ns)
             state.spraying = deserialize_message(message.cdr, Bool).data
             state.flow = relative_flow(state.spraying)
@@ -304,4 +296,8 @@ def state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage],
                     setattr(state, name, float(getattr(recorded, name, math.nan)))
         return serialize_message(state)
 
-    return as_state
+    def _publish_clock(self) -> None:
+        with self._clock_order:
+            time_ns = self._time.time_ns
+            if self._clock_publisher and time_ns is not None:
+                self._clock_publisher.publish(Clock(clock=Time(nanoseconds=time_ns).to_msg()))

@@ -63,16 +63,15 @@ class ReplayClock:
     def wait_for(self, time_ns: int, stopped: threading.Event) -> None:
         """Wait for that time, at rate 0 only for the end of a pause; no longer once stopped."""
         with self._changed:
-            while (left_s := self._remaining_s(time_ns)) > 0.0 and not stopped.is_set():
+            while not stopped.is_set():
+                now_ns, left_s = self.time_ns, math.inf
+                if self._rate == 0.0 and self.running:
+                    left_s = 0.0
+                elif self._since_s is not None and now_ns is not None:
+                    left_s = (time_ns - now_ns) * 1e-9 / self._rate
+                if left_s <= 0.0:
+                    break
                 self._changed.wait(min(left_s, 0.05))
-
-    def _remaining_s(self, time_ns: int) -> float:
-        if self._rate == 0.0:
-            return 0.0 if self.running else math.inf
-        now_ns = self.time_ns
-        if self._since_s is None or now_ns is None:
-            return math.inf
-        return (time_ns - now_ns) * 1e-9 / self._rate
 
 
 @dataclass

@@ -165,7 +165,16 @@ class RecordedTopic(AdaptiveSubscription):
         if number is None or publisher is None:
             self.unnumbered += 1
         else:
-            self._count_before_first(publisher['data'], number, info)
+            # What it sent in the run before it was heard is told by how often it sends.
+            gid, sent_ns = publisher['data'], info['source_timestamp']
+            if gid not in self._first and len(self._first) < MOST_PUBLISHERS:
+                waited_ns = max(info['received_timestamp'] - self._begun_ns, 0)
+                self._first[gid] = number, sent_ns, waited_ns
+            first, first_sent_ns, waited_ns = self._first.get(gid, (number, 0, 0))
+            # The first few tell.
+            if 0 < number - first <= 50:
+                period_ns = max((sent_ns - first_sent_ns) / (number - first), 1.0)
+                self._before_first[gid] = int(min(first - 1, waited_ns / period_ns))
         if self._max_gap_ns is not None:
             before_ns, self.newest_stamp_ns = self.newest_stamp_ns, header_stamp_ns(cdr)
             gap_ns = self.newest_stamp_ns - before_ns
@@ -176,18 +185,6 @@ class RecordedTopic(AdaptiveSubscription):
         self._log_time_ns = max(self._log_time_ns, info['received_timestamp'])
         self.sent_ns = info['source_timestamp']
         self._pass_on(self.name, cdr, self._log_time_ns, self.sent_ns)
-
-    def _count_before_first(self, publisher: bytes, number: int, info: Mapping[str, Any]) -> None:
-        """Count what a publisher sent in the run before it was heard, by how often it sends."""
-        sent_ns = info['source_timestamp']
-        if publisher not in self._first and len(self._first) < MOST_PUBLISHERS:
-            waited_ns = max(info['received_timestamp'] - self._begun_ns, 0)
-            self._first[publisher] = number, sent_ns, waited_ns
-        first, first_sent_ns, waited_ns = self._first.get(publisher, (number, 0, 0))
-        # The first few tell.
-        if 0 < number - first <= 50:
-            period_ns = max((sent_ns - first_sent_ns) / (number - first), 1.0)
-            self._before_first[publisher] = int(min(first - 1, waited_ns / period_ns))
 
 
 def bag_qos(profile: QoSProfile) -> Qos:

@@ -255,7 +255,7 @@ class RunRecorder(ManagedNode):
     def _record_failure(self, error: RecordingError) -> None:
         self._error = error
         self.get_logger().error(str(error))
-        self.fail(error)
+        self.finish(error)
 
     def _report_progress(self) -> None:
         for name in self._progress.keys() & self.recorded.keys():
