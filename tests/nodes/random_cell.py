@@ -11,6 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from paint_msgs.msg import PoseProgress
+from std_srvs.srv import Trigger
 
 from brushes import NARROW, WIDE, two_brushes
 from nodes.cell import Onlooker, Robot, free_port, offline_um, parameters, write_panel
@@ -45,7 +46,7 @@ class Simulator(DepositionSimulator):
         self.keep()
         super().change_part(*part)
 
-    def reset(self) -> tuple[bool, str]:
+    def reset(self) -> Trigger.Response:
         self.catch_up()
         self.keep()
         self.catch_up = lambda: None  # what comes from here on is of the next run

@@ -265,7 +265,9 @@ def test_a_change_that_fails_is_none(simulated, painted, asked, wait_until, tmp_
     for step in (node.trigger_deactivate, node.trigger_cleanup):
         assert step() != TransitionCallbackReturn.SUCCESS
     assert node.active
-    assert node.reset() == (False, 'the part is being changed: call again after it')
+    refused = node.reset()
+    assert not refused.success
+    assert refused.message == 'the part is being changed: call again after it'
     source.send(MOTION, frame_id=frame)
     wait_until(future.done, what='the answer')
     assert not future.result().success

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from geometry_msgs.msg import Point
 from paint_msgs.msg import ComparisonStats
+from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.errors import PaintError, ReadingsError
@@ -63,7 +64,7 @@ class ModelComparison(PaintingNode):
         self._mesh_publisher = latched(Marker, 'comparison/mesh')
         self._stats_publisher = latched(ComparisonStats, 'comparison/stats')
         self._legend_publisher = latched(MarkerArray, 'comparison/legend')
-        self.create_trigger_service('~/compare', self._compare)
+        self.create_service(Trigger, '~/compare', lambda *_: self._compare())
         self._publish_legend()
         self.publish()
         return painting_tasks(self) | {'comparison': self.status}
@@ -164,7 +165,7 @@ class ModelComparison(PaintingNode):
         bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
         self._legend_publisher.publish(bar)
 
-    def _compare(self) -> tuple[bool, str]:
+    def _compare(self) -> Trigger.Response:
         """The comparison in one line."""
         self.catch_up()
         found = self.residuals()
@@ -179,7 +180,7 @@ class ModelComparison(PaintingNode):
         if doubt := zeros_in_doubt(self.readings, found.predicted_um):
             line += f'; {doubt}'
         self.get_logger().info(line)
-        return True, line
+        return Trigger.Response(success=True, message=line)
 
     def status(self) -> Status:
         found = self.residuals()

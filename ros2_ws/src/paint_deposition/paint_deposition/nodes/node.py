@@ -28,10 +28,9 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.timer import Timer
-from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError, quoted
-from paint_deposition.nodes.parameters import ParameterTable, declare_parameters
+from paint_deposition.nodes.parameters import RUNS, ParameterTable, declare_parameters
 
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
@@ -157,15 +156,6 @@ class PaintNode(Node):
         """A timer that also runs while a simulated clock stands still."""
         return self.create_timer(period_s, callback, clock=self._steady)
 
-    def create_trigger_service(self, name: str, handle: Callable[[], tuple[bool, str]]) -> None:
-        """A std_srvs/Trigger service; `handle` returns success and message."""
-
-        def respond(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            response.success, response.message = handle()
-            return response
-
-        self.create_service(Trigger, name, respond)
-
     async def result_of(self, work: concurrent.futures.Future) -> Any:
         """Await work that a thread does; other callbacks run meanwhile."""
         self.awaiting += 1
@@ -252,7 +242,7 @@ class PaintNode(Node):
         changes: list[Parameter[Any]] = []
         for change in parameter_list:
             name, row = change.name, self.PARAMETERS.get(change.name)
-            if row and row.fixed_because and (self.configured or row.is_read_only):
+            if row and row.fixed_because and (self.configured or row.fixed_while == RUNS):
                 reason = f'{name} cannot change while the node {row.fixed_while}: '
                 return SetParametersResult(successful=False, reason=reason + row.fixed_because)
             with contextlib.suppress(PaintError):  # what is invalid is refused as it is

@@ -47,11 +47,6 @@ class NodeParameter:
     fixed_while: str = RUNS
 
     @property
-    def is_read_only(self) -> bool:
-        """Whether it cannot change in any state of the node."""
-        return bool(self.fixed_because) and self.fixed_while == RUNS
-
-    @property
     def is_path(self) -> bool:
         """Whether it names a file or a folder, or several."""
         return self.description.endswith('[path]')
@@ -69,7 +64,7 @@ class NodeParameter:
             type=self.ros_type.value,
             description=self.description,
             additional_constraints='; '.join(filter(None, texts)),
-            read_only=self.is_read_only,
+            read_only=bool(self.fixed_because) and self.fixed_while == RUNS,
         )
         low, high = self.bounds or (0, 0)
         if self.bounds and self.ros_type == Parameter.Type.INTEGER:

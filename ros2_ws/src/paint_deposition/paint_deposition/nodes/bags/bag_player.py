@@ -4,7 +4,6 @@ import math
 import threading
 import time
 from collections.abc import Iterable, Iterator
-from functools import partial
 from heapq import merge
 from itertools import groupby
 from operator import attrgetter
@@ -20,6 +19,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings import messages as definitions
@@ -110,8 +110,8 @@ class BagPlayer(PaintNode):
         if self.values['publish_clock']:
             self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
             self.create_steady_timer(0.01, self._publish_clock)
-        self.create_trigger_service('~/pause', partial(self._set_running, False))
-        self.create_trigger_service('~/resume', partial(self._set_running, True))
+        self.create_service(Trigger, '~/pause', lambda *_: self._set_running(False))
+        self.create_service(Trigger, '~/resume', lambda *_: self._set_running(True))
         self._subscribers_to_await = self.values['wait_for_subscribers']
         window = self.values['window']
         self._flow_control = FlowControl(self, self._pose_publisher, window, self.stopped)
@@ -190,12 +190,14 @@ class BagPlayer(PaintNode):
 
     # --- called by the executor
 
-    def _set_running(self, running: bool) -> tuple[bool, str]:
+    def _set_running(self, running: bool) -> Trigger.Response:
         changes = self._time.running != running
         self._time.change(running=running)
-        if running:
-            return changes, 'resumed' if changes else 'not paused'
-        return changes, 'paused' if changes else 'already paused'
+        if changes:
+            message = 'resumed' if running else 'paused'
+        else:
+            message = 'not paused' if running else 'already paused'
+        return Trigger.Response(success=changes, message=message)
 
     def status(self) -> Status:
         if self._clock_publisher and self.count_publishers('/clock') > 1:

@@ -200,7 +200,8 @@ class FlowControl:
             if count < wanted and now_s - logged_s > LOG_PERIOD_S:
                 logged_s = now_s
                 topic = self._publisher.topic_name
-                self._log_status(f'waiting for {wanted} subscribers on {topic}, {count} there')
+                self.status = f'waiting for {wanted} subscribers on {topic}, {count} there'
+                self._node.get_logger().info(self.status)
             self._stopped.wait(0.1)
         self._discover()
 
@@ -240,10 +241,7 @@ class FlowControl:
             if now_s - logged_s > LOG_PERIOD_S:
                 logged_s = now_s
                 late = ', '.join(f'{name}, {count} poses behind' for name, count in behind.items())
-                self._log_status(f'waiting for {late}')
+                self.status = f'waiting for {late}'
+                self._node.get_logger().info(self.status)
             self._stopped.wait(0.001)
         self.status = 'playing'
-
-    def _log_status(self, status: str) -> None:
-        self.status = status
-        self._node.get_logger().info(status)

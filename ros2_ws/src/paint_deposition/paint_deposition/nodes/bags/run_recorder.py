@@ -10,6 +10,7 @@ from pathlib import Path
 
 from paint_msgs.msg import Part, PoseProgress
 from rclpy.serialization import deserialize_message
+from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
@@ -71,7 +72,7 @@ class RunRecorder(ManagedNode):
             poses: self.create_publisher(PoseProgress, gun_topic(gun, PROGRESS_TOPIC), PROGRESS)
             for gun, (poses, _) in motion.items()
         }
-        self.create_trigger_service('~/stop', self._stop)
+        self.create_service(Trigger, '~/stop', lambda *_: self._stop())
         return {'recording': self.status}
 
     def _activate(self) -> None:
@@ -266,14 +267,15 @@ class RunRecorder(ManagedNode):
 
     # --- ending
 
-    def _stop(self) -> tuple[bool, str]:
+    def _stop(self) -> Trigger.Response:
         if self.active:
             self.trigger_deactivate()
         # The answer of a process that ends at once may be lost; its client would wait for ever.
         self.create_steady_timer(1.0, self.finish)
         if not self.runs:
-            return True, 'nothing was recorded: the recorder was never activated'
-        return self.run.complete, self.summary()
+            message = 'nothing was recorded: the recorder was never activated'
+            return Trigger.Response(success=True, message=message)
+        return Trigger.Response(success=self.run.complete, message=self.summary())
 
     def _deactivate(self) -> None:
         for topic in self.recorded.values():
