@@ -39,7 +39,7 @@ class Simulator(DepositionSimulator):
         self.left = SimpleNamespace(
             points=self.points, surface=self.surface, film=self.film.snapshot().film_um,
             models=self.models, received=self.film.counts.received,
-            refused=self.inputs[0].poses_refused,
+            refused=self.inputs[0].refused_frames.total(),
         )  # fmt: skip
 
     def change_part(self, *part) -> None:
@@ -147,8 +147,8 @@ class NodesOfACell(RuleBasedStateMachine):
 
     @property
     def painted(self) -> int:
-        counted = self.simulator.film.counts.received + self.simulator.inputs[0].poses_refused
-        return counted + self.painted_before
+        refused = self.simulator.inputs[0].refused_frames.total()
+        return self.simulator.film.counts.received + refused + self.painted_before
 
     def check(self, run: Path, of: SimpleNamespace) -> None:
         """Compare the film of a run with that which the simulator had of it."""

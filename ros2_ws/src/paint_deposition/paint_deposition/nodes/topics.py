@@ -80,7 +80,8 @@ class AdaptiveSubscription:
             service as well; else by the executor, and `match_qos` is called now and then.
 
     Attributes:
-        lost: messages missing after the first of each publisher, by the numbers they have.
+        lost: messages missing after the first of each publisher, by the numbers they have; whoever
+            counts anew sets it to 0.
     """
 
     def __init__(

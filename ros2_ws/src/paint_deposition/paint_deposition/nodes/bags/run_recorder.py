@@ -300,7 +300,7 @@ class RunRecorder(ManagedNode):
     @property
     def _losses(self) -> str:
         topics = self.recorded.values()
-        missed = sum(topic.missed for topic in topics)
+        missed = sum(topic.lost for topic in topics)
         lost = f', {missed} missed' if missed else ''
         first = [f'{t.before_discovery} of {t.name}' for t in topics if t.before_discovery]
         lost += f', {" and ".join(first)} {MISSED_BEFORE_DISCOVERY}' if first else ''
@@ -336,7 +336,7 @@ class RunRecorder(ManagedNode):
             return Status(ERROR, f'not recorded: {" ".join(sorted(self._refused))}', values)
         if free < 1_000_000_000:
             return Status(WARN, 'the disk is almost full', values)
-        if self._too_late or any(topic.missed for topic in topics):
+        if self._too_late or any(topic.lost for topic in topics):
             return Status(WARN, f'messages were missed{self._losses}', values)
         return Status(OK, 'recording', values)
 

@@ -107,14 +107,9 @@ class AtomizerInput:
         node.create_steady_timer(0.2, self._report_progress)
 
     @property
-    def poses_refused(self) -> int:
-        """Poses refused for their frame since the last reset."""
-        return sum(self.refused_frames.values())
-
-    @property
     def messages_lost(self) -> int:
         """Messages that the middleware has lost since the last reset."""
-        return sum(topic.lost for topic in self._topics) - self._lost_before
+        return sum(topic.lost for topic in self._topics)
 
     def reset(self) -> None:
         """Reset the counts; poses that were not painted yet are dropped."""
@@ -132,7 +127,8 @@ class AtomizerInput:
         self.anomalies: Counter[str] = Counter()
         self.state_errors: set[str] = set()
         self.unpainted = 0
-        self._lost_before = sum(topic.lost for topic in self._topics)
+        for topic in self._topics:
+            topic.lost = 0
         self.intervals = Intervals()
         self.jumps = Jumps()
 

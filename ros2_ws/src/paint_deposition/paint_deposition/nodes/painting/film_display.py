@@ -222,12 +222,21 @@ class FilmDisplay:
         at = header(self._node.frame.frame_id, self._node.film.newest_ns or 0)
         if changed:
             self._update_stats(film, run, at)
-        self._publish_large(film, at)
+        film_um, surface = self._film_um, self._node.surface
+        make: dict[str, Callable[[], Any]] = {
+            'thickness/mesh': lambda: self._mesh_message(at.frame_id),
+            'thickness/cloud': lambda: cloud_message(surface, film_um, at),
+            'thickness/field': lambda: field_message(surface, film_um, at),
+        }
+        for gun, topic in enumerate(self._share_topics):
+            make[topic] = partial(lambda k: field_message(surface, film.shares_um[k], at), gun)
+        for topic, message in make.items():
+            self._large[topic].publish_if_wanted(self._version, message)
         if changed:
             self._publish_duration_s = time.monotonic() - began_s
         # The statistics are published when a count has changed, too.
         node, message = self._node, self._stats
-        refused = sum(source.poses_refused for source in node.inputs)
+        refused = sum(source.refused_frames.total() for source in node.inputs)
         counts = node.film.counts
         longest_s = max(source.intervals.longest_ns for source in node.inputs) * 1e-9
         now = counts.received + refused, counts.rejected + refused, counts.gaps, longest_s
@@ -259,18 +268,6 @@ class FilmDisplay:
         if ends != self._legend_ends:
             self._legend_ends = ends
             self._legend.publish(legend(self._scale, 'µm', node.surface, at.frame_id))
-
-    def _publish_large(self, film: CommonFilm, at: Header) -> None:
-        film_um, surface = self._film_um, self._node.surface
-        make: dict[str, Callable[[], Any]] = {
-            'thickness/mesh': lambda: self._mesh_message(at.frame_id),
-            'thickness/cloud': lambda: cloud_message(surface, film_um, at),
-            'thickness/field': lambda: field_message(surface, film_um, at),
-        }
-        for gun, topic in enumerate(self._share_topics):
-            make[topic] = partial(lambda k: field_message(surface, film.shares_um[k], at), gun)
-        for topic, message in make.items():
-            self._large[topic].publish_if_wanted(self._version, message)
 
     def _mesh_message(self, frame_id: str) -> bytes:
         surface = self._node.surface

@@ -56,7 +56,7 @@ def what_was_wrong(source: AtomizerInput, film: LiveFilm) -> dict[str, int]:
         'steps faster than a robot': source.jumps.count,
         **source.anomalies,
         LOST: source.messages_lost,
-        REFUSED: source.poses_refused,
+        REFUSED: source.refused_frames.total(),
     }
 
 
@@ -72,7 +72,7 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         gun = f'spraying, flow {film.flow:g}' + (f', brush {film.brush}' if film.brush else '')
     values: dict[str, object] = {
         'poses taken': counts.received,
-        'poses refused': counts.rejected + source.poses_refused,
+        'poses refused': counts.rejected + wrong[REFUSED],
         **wrong,
         'longest interval [s]': f'{source.intervals.longest_ns * 1e-9:.3f}',
         'intervals over 1.5 times the usual one': source.intervals.long,
@@ -95,7 +95,7 @@ def poses_status(node: PaintingNode, number: int) -> Status:
     if source.refused_frames and time.monotonic() - source.refused_s < 5.0:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
         words = (
-            f'{source.poses_refused} poses refused: they are in frame {frames}, the mesh is in '
+            f'{wrong[REFUSED]} poses refused: they are in frame {frames}, the mesh is in '
             f"'{node.frame.frame_id}' and {source.refusal}"
         )
         return Status(ERROR, words, values)
