@@ -25,7 +25,7 @@ from paint_deposition.nodes.painting.health import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.parameters import CONFIGURED, NodeParameter, fixed
-from paint_deposition.nodes.topics import ColouredMesh, header
+from paint_deposition.nodes.topics import coloured_mesh, header
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, turned
 from paint_deposition.report.colour_scales import ColourScale, residual_scale
@@ -99,7 +99,7 @@ class ModelComparison(PaintingNode):
         for doubt in readings_in_doubt(surface, self.readings, np.zeros(len(self.readings))):
             self.get_logger().warning(doubt)
         frame_id = self.frame.frame_id
-        self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'residual')
+        self._mesh = coloured_mesh(surface.vertices_m, surface.faces, frame_id, 'residual')
         at = slice(len(self._experiment))
         places, normals = self.points.positions_m[at], self.points.normals[at]
         self._spreading = interpolation_matrix(surface, places, normals)
@@ -159,7 +159,7 @@ class ModelComparison(PaintingNode):
         at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
         scale = self._scale
         rows = scale.rows(self._spreading @ at_points, self._coloured)
-        self._mesh_publisher.publish(self._mesh.serialise(stamp_ns, scale.palette, rows))
+        self._mesh_publisher.publish(self._mesh(stamp_ns, scale.palette, rows))
 
     def _publish_legend(self) -> None:
         bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)

@@ -1,6 +1,7 @@
 """Node `web_view`: the film as it is painted, on a page for browsers."""
 
 import contextlib
+import math
 import os
 import sys
 import time
@@ -65,13 +66,13 @@ class WebView(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__(**kwargs)
-        results = topics.RESULTS
+        results, compared = topics.RESULTS, partial(setattr, self, '_comparison')
         for message, topic, take, profile in (
             (Part, topics.PART_TOPIC, self._take_part, topics.LATCHED),
             (TransformStamped, PART_POSE_TOPIC, self._take_part_pose, topics.LATCHED),
             (ThicknessField, 'thickness/field', self._take_field, results),
             (ThicknessStats, 'thickness/stats', self._take_stats, topics.LATCHED),
-            (ComparisonStats, 'comparison/stats', self._take_comparison, topics.LATCHED),
+            (ComparisonStats, 'comparison/stats', compared, topics.LATCHED),
             (DiagnosticStatus, topics.TRUST_TOPIC, self._take_trust, topics.LATCHED),
         ):
             self.create_subscription(message, topic, take, profile)
@@ -101,7 +102,7 @@ class WebView(PaintNode):
         }
         # Stamp of the newest figures; their time, which goes on where a stream is restarted.
         self._newest_ns, self._time_s = 0, 0.0
-        self._rmse_um = float('nan')
+        self._comparison = ComparisonStats(rmse_um=math.nan)
         # What makes the film doubtful, '' if nothing does, and when the simulator said so.
         self._doubts, self._trusted_s = '', time.monotonic()
         self._problem = ''
@@ -171,10 +172,7 @@ class WebView(PaintNode):
         if now_ns:  # there was a pose
             self._time_s += max(now_ns - (self._newest_ns or now_ns), 0) * 1e-9
             self._newest_ns = now_ns
-            self.scene.add_figures(self._time_s, stats, self._rmse_um)
-
-    def _take_comparison(self, stats: ComparisonStats) -> None:
-        self._rmse_um = stats.rmse_um
+            self.scene.add_figures(self._time_s, stats, self._comparison.rmse_um)
 
     def _take_trust(self, trust: DiagnosticStatus) -> None:
         self._doubts = '' if trust.level == OK else trust.message

@@ -35,7 +35,8 @@ from paint_deposition.nodes.painting.health import (
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.topics import (
     PROGRESS_TOPIC,
-    ColouredMesh,
+    MeshMessage,
+    coloured_mesh,
     gun_topic,
     header,
     node_name,
@@ -156,7 +157,7 @@ class FilmDisplay:
             )
         }
         self._surface: Surface | None = None
-        self._mesh: ColouredMesh | None = None
+        self._mesh: MeshMessage | None = None
         self._stats = ThicknessStats()
         self._counts: tuple | None = None
         # Counts the films shown, and changes of their colours.
@@ -272,10 +273,10 @@ class FilmDisplay:
     def _mesh_message(self, frame_id: str) -> bytes:
         surface = self._node.surface
         if self._mesh is None:
-            self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
+            self._mesh = coloured_mesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
         is_painted = self._film_um > self._node.values['painted_above_um']
         rows = self._scale.rows(self._film_um, is_painted)
-        return self._mesh.serialise(self._node.film.newest_ns or 0, self._scale.palette, rows)
+        return self._mesh(self._node.film.newest_ns or 0, self._scale.palette, rows)
 
 
 def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> MarkerArray:
