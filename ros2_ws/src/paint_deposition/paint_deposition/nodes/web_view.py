@@ -78,13 +78,12 @@ class WebView(PaintNode):
             self.create_subscription(message, topic, take, profile)
         self._inputs = [
             AdaptiveSubscription(
-                self, message, gun_topic(name, topic), partial(take, name), depth=500,
+                self, message, gun_topic(name, topic), partial(self._take_input, name), depth=500,
                 latched=message is AtomizerState,
             )
             for name in self.values['atomizers'] or ['']
-            for message, topic, take in (
-                (AtomizerState, 'atomizer/state', self._take_state),
-                (PoseStamped, 'atomizer/pose', self._take_pose),
+            for message, topic in (
+                (AtomizerState, 'atomizer/state'), (PoseStamped, 'atomizer/pose'),
             )
         ]  # fmt: skip
         # At 1 kHz fifty poses wait at most.
@@ -212,12 +211,12 @@ class WebView(PaintNode):
         for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
             self._frame.tree.place(self._frame.frame_id, parent, pose)
 
-    def _take_state(self, gun: str, state: AtomizerState, _info: Any) -> None:
+    def _take_input(self, gun: str, message: PoseStamped | AtomizerState, _info: Any) -> None:
+        if isinstance(message, PoseStamped):
+            self._waiting[gun].append((time.monotonic(), message))
+            return
         with contextlib.suppress(PaintError):  # the simulator, which refuses it, says so
-            self._flow[gun] = trigger_change(state).flow
-
-    def _take_pose(self, gun: str, message: PoseStamped, _info: Any) -> None:
-        self._waiting[gun].append((time.monotonic(), message))
+            self._flow[gun] = trigger_change(message).flow
 
     def status(self) -> Status:
         sent, now_s = self.page.bytes_sent, time.monotonic()
