@@ -144,7 +144,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
                 self._activate()
             else:
                 self._lasting = before
-                self._load()
+                super()._start()
                 self.tasks = {**self._configure(), 'state': self._state_status}
         except BaseException:
             self._created.pop()

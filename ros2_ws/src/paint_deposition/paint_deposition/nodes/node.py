@@ -91,9 +91,6 @@ class PaintNode(Node):
         self.add_on_set_parameters_callback(self._on_set_parameters)
 
     def _start(self) -> None:
-        self._load()
-
-    def _load(self) -> None:
         """Read the files; SIGINT and SIGTERM interrupt it."""
         PaintNode.loading = True
         PaintNode.end_if_loading()

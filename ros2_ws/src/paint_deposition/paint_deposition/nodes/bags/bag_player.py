@@ -236,7 +236,7 @@ class BagPlayer(PaintNode):
                 # Wait for the end of a pause, the time of the message, and the flow control.
                 self._time.wait_for(message.log_time_ns, self.stopped)
                 if self.values['rate'] == 0.0:
-                    self._flow_control.wait_for_room()
+                    self._flow_control.wait_for_lag_below(self.values['window'])
                     self._time.change(time_ns=message.log_time_ns)
                 if self.stopped.is_set():
                     return
@@ -279,8 +279,8 @@ class BagPlayer(PaintNode):
             self._state_publisher.publish(self._state_of(message, bag))
             self.states_published += 1
 
-    def _state_of(self, message: RawMessage, bag: Bag) -> bytes:
-        """The bytes of an AtomizerState from a recorded Bool or state."""
+    def _state_of(self, message: RawMessage, bag: Bag) -> AtomizerState | bytes:
+        """A recorded Bool or state as the message of today, or its bytes if it is one."""
         if self._states_are_current:
             return message.cdr
         state = unknown_state()
@@ -288,15 +288,16 @@ class BagPlayer(PaintNode):
             state.header = header('', message.log_time_ns)
             state.spraying = deserialize_message(message.cdr, Bool).data
             state.flow = relative_flow(state.spraying)
-        else:  # another version of the message: fields of the same name are copied
-            recorded = bag.decode(message)
-            state.header = header(recorded.header.frame_id, stamp_ns(recorded.header))
-            state.spraying = bool(recorded.spraying)
-            state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
-            for name, kind in state.get_fields_and_field_types().items():
-                if kind == 'double':
-                    setattr(state, name, float(getattr(recorded, name, math.nan)))
-        return serialize_message(state)
+            return state
+        # Of another version of the message, fields of the same name are copied.
+        recorded = bag.decode(message)
+        state.header = header(recorded.header.frame_id, stamp_ns(recorded.header))
+        state.spraying = bool(recorded.spraying)
+        state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
+        for name, kind in state.get_fields_and_field_types().items():
+            if kind == 'double':
+                setattr(state, name, float(getattr(recorded, name, math.nan)))
+        return state
 
     def _publish_clock(self) -> None:
         with self._clock_order:

@@ -205,15 +205,9 @@ class FlowControl:
             self._stopped.wait(0.1)
         self._discover()
 
-    def wait_for_room(self) -> None:
-        """Wait until one more pose fits into the window."""
-        if self._sent % self._window == 0:
-            self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN)
-        self._wait_for_lag_below(self._window)
-
     def wait_until_taken(self) -> None:
         """Wait until every pose is taken or known to be lost."""
-        self._wait_for_lag_below(1)
+        self.wait_for_lag_below(1)
         deadline_s = time.monotonic() + LOG_PERIOD_S
         while not self._stopped.is_set() and time.monotonic() < deadline_s:
             if self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN):
@@ -222,7 +216,10 @@ class FlowControl:
             if subscriber.lost:
                 self._node.get_logger().warning(f'{name} has lost {subscriber.lost} poses')
 
-    def _wait_for_lag_below(self, limit: int) -> None:
+    def wait_for_lag_below(self, limit: int) -> None:
+        """Wait until all subscribers that are waited for have fewer poses to take than that."""
+        if self._sent % self._window == 0:
+            self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN)
         logged_s = time.monotonic()
         while not self._stopped.is_set():
             now_s = time.monotonic()
