@@ -49,7 +49,8 @@ def declared(ros_context, executor):
 
 
 def test_defaults_keep_their_types(declared):
-    node, values = declared()
+    # Those of rclpy are not ours.
+    node, values = declared(use_sim_time=False, **{'qos_overrides./tf.publisher.depth': 3})
     assert values == {name: row.default for name, row in TABLE.items()}
     described = {name: node.describe_parameter(name) for name in values}
     assert described['rate_hz'].type == ParameterType.PARAMETER_DOUBLE
@@ -114,10 +115,6 @@ def test_a_home_folder_is_found_at_the_start_and_later(declared, monkeypatch, tm
     assert node.get_parameter('model_file').value == f'{tmp_path}/b.yaml'
     (result,) = node.set_parameters(parameters(model_file=7))
     assert 'Wrong parameter type' in result.reason
-
-
-def test_sim_time_and_qos_overrides_are_not_ours(declared):
-    declared(use_sim_time=False, **{'qos_overrides./tf.publisher.depth': 3})
 
 
 @pytest.mark.parametrize('node', NODES)
