@@ -4,7 +4,6 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -156,7 +155,7 @@ class PaintingNode(ManagedNode, ABC):
         film = self._unpainted(surface, points, self.models)
         film.warm_up()
         facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # builds the tree for a gun's rays
-        return PreparedPart(surface, points, film, zones)
+        return surface, points, film, zones
 
     def _unpainted(
         self, surface: Surface, points: SurfacePoints, models: Iterable[DepositionModel]
@@ -169,8 +168,8 @@ class PaintingNode(ManagedNode, ABC):
 
     def _take_part(self, part: PreparedPart) -> None:
         """Paint this part from now on."""
-        self.surface, self.points, self.zones = part.surface, part.points, part.zones
-        self.film, self._shown = part.film, None
+        self.surface, self.points, self.film, self.zones = part
+        self._shown = None
         self._guns_to_orient = list(range(len(self.gun_names)))
         self._surface_changed()
 
@@ -203,16 +202,16 @@ class PaintingNode(ManagedNode, ABC):
         Raises:
             ModelError: the model does not have the brush that a gun sprays with.
         """
-        film = part.film
+        surface, points, film, zones = part
         if any(new.model != now for new, now in zip(film.guns, self.models, strict=True)):
-            film = self._unpainted(part.surface, part.points, self.models)
+            film = self._unpainted(surface, points, self.models)
         for new, old in zip(film.guns, self.film.guns, strict=True):
             new.trigger_latency_s = self.values['trigger_latency_s']
             new.reset_keeping_trigger_of(old)
         for source in self.inputs:
             source.reset_counts()
         self.mesh_file, self.files_in_use = mesh_file, self._files
-        self._take_part(replace(part, film=film))
+        self._take_part((surface, points, film, zones))
         if self.repainting is not None:
             self._repaint()
 

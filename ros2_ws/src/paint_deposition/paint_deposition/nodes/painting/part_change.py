@@ -71,7 +71,7 @@ class PartChange:
         self._run, self._resets = '', 0
         self._since = datetime.now(timezone.utc)
         present: Future[PreparedPart] = Future()
-        present.set_result(PreparedPart(node.surface, node.points, node.film, node.zones))
+        present.set_result((node.surface, node.points, node.film, node.zones))
         self._parts = {version: present}
         self._reading = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
         self.waiting = False
@@ -138,8 +138,9 @@ class PartChange:
                 response.success = not await self._change(request, response)
             elif request.mesh_file:
                 mesh_file = os.path.expanduser(request.mesh_file)
-                part = await self._node.result_of(self._prepared(mesh_version(mesh_file)))
-                response.message = f'{mesh_file} is prepared: {part.surface!r}'
+                prepared = self._prepared(mesh_version(mesh_file))
+                surface, *_ = await self._node.result_of(prepared)
+                response.message = f'{mesh_file} is prepared: {surface!r}'
                 response.success = True
             else:
                 raise PaintError('prepare needs a mesh_file: name the mesh to read ahead of time')
