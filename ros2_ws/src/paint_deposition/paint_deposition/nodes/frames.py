@@ -61,7 +61,8 @@ class PartFrame:
 
     Attributes:
         frame_id: of the part; tree: the transforms that are known.
-        tf_topics: the subscriptions to tf; none where its messages are not installed.
+        tf_topics: the subscriptions to tf, which are polled; none where its messages are not
+            installed.
     """
 
     def __init__(self, node: PaintNode, frame_id: str) -> None:
@@ -72,11 +73,6 @@ class PartFrame:
         self.tf_topics: list[AdaptiveSubscription] = []
         with contextlib.suppress(ImportError):
             self.tf_topics = subscribe_to_tf(node, self.tree, self._take)
-
-    def take_pending(self) -> None:
-        """Take the transforms in the queues."""
-        for topic in self.tf_topics:
-            topic.take_pending()
 
     def _take(self, message: Any, _info: Any) -> None:
         for transform in transforms_of(message):

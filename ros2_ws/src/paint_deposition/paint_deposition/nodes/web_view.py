@@ -193,8 +193,7 @@ class WebView(PaintNode):
     # --- the guns
 
     def _take_motion(self) -> None:
-        self._frame.take_pending()
-        for topic in self._inputs:
+        for topic in (*self._frame.tf_topics, *self._inputs):
             topic.take_pending()
         for gun, waiting in self._waiting.items():
             for pose, placed in placed_in_order(waiting, self._frame.on_part, time.monotonic()):

@@ -168,8 +168,7 @@ class AtomizerInput:
 
         They are painted at once, or when they fill a batch or have waited for long enough.
         """
-        self._node.frame.take_pending()
-        for topic in self._topics:
+        for topic in (*self._node.frame.tf_topics, *self._topics):
             topic.take_pending()
         # Latched states may come behind others that were sent later.
         poses, states = [*self._new_poses], sorted(self._new_states, key=itemgetter(1))
