@@ -17,7 +17,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
-from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState, PointCloud2
@@ -28,7 +27,15 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.transforms import Rigid
-from paint_deposition.nodes.topics import CLOCK, LATCHED, PROGRESS, RESULTS, TRUST_TOPIC
+from paint_deposition.nodes.topics import (
+    CLOCK,
+    LATCHED,
+    PROGRESS,
+    RESULTS,
+    TRUST_TOPIC,
+    header,
+    pose_message,
+)
 
 START_NS = 1_760_000_000_000_000_000
 # The tool's z axis along +y, toward a panel that looks to -y.
@@ -198,12 +205,7 @@ class Robot(Node):
         return min(poses_here, states_here), min(poses, states)
 
     def send_pose(self, stamp_ns, position, quaternion, frame_id: str = 'part') -> None:
-        message = PoseStamped()
-        message.header.frame_id = frame_id
-        message.header.stamp = Time(nanoseconds=int(stamp_ns)).to_msg()
-        p, q = message.pose.position, message.pose.orientation
-        p.x, p.y, p.z = map(float, position)
-        q.x, q.y, q.z, q.w = map(float, quaternion)
+        message = pose_message(frame_id, int(stamp_ns), [*position, *quaternion])
         self.pose_publisher.publish(message)
 
     def send_state(self, stamp_ns, flow: float, brush: int = 0) -> None:
@@ -211,8 +213,7 @@ class Robot(Node):
 
     def send_fields(self, stamp_ns, **fields: object) -> None:
         """A state of which only these fields are filled."""
-        message = AtomizerState(**fields)
-        message.header.stamp = Time(nanoseconds=int(stamp_ns)).to_msg()
+        message = AtomizerState(header=header('', int(stamp_ns)), **fields)
         self.state_publisher.publish(message)
 
     def send(self, trajectory: Trajectory, rows: slice = slice(None), frame_id='part') -> None:
@@ -246,9 +247,8 @@ class Broadcaster(Node):
         """Poses by `parent_to_child`, in one message."""
         transforms = []
         for name, pose in poses.items():
-            transform = TransformStamped()
-            transform.header.frame_id, transform.child_frame_id = name.split('_to_')
-            transform.header.stamp = Time(nanoseconds=int(stamp)).to_msg()
+            parent, child = name.split('_to_')
+            transform = TransformStamped(header=header(parent, int(stamp)), child_frame_id=child)
             t, q = transform.transform.translation, transform.transform.rotation
             t.x, t.y, t.z, q.x, q.y, q.z, q.w = map(float, pose.values)
             transforms.append(transform)

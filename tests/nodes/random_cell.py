@@ -11,6 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from paint_msgs.msg import PoseProgress
+from std_srvs.srv import Trigger
 
 from brushes import NARROW, WIDE, two_brushes
 from nodes.cell import Onlooker, Robot, free_port, offline_um, parameters, write_panel
@@ -38,14 +39,14 @@ class Simulator(DepositionSimulator):
         self.left = SimpleNamespace(
             points=self.points, surface=self.surface, film=self.film.snapshot().film_um,
             models=self.models, received=self.film.counts.received,
-            refused=self.inputs[0].poses_refused,
+            refused=self.inputs[0].refused_frames.total(),
         )  # fmt: skip
 
     def change_part(self, *part) -> None:
         self.keep()
         super().change_part(*part)
 
-    def reset(self) -> tuple[bool, str]:
+    def reset(self) -> Trigger.Response:
         self.catch_up()
         self.keep()
         self.catch_up = lambda: None  # what comes from here on is of the next run
@@ -146,8 +147,8 @@ class NodesOfACell(RuleBasedStateMachine):
 
     @property
     def painted(self) -> int:
-        counted = self.simulator.film.counts.received + self.simulator.inputs[0].poses_refused
-        return counted + self.painted_before
+        refused = self.simulator.inputs[0].refused_frames.total()
+        return self.simulator.film.counts.received + refused + self.painted_before
 
     def check(self, run: Path, of: SimpleNamespace) -> None:
         """Compare the film of a run with that which the simulator had of it."""

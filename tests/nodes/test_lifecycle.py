@@ -203,10 +203,6 @@ def test_each_activation_is_a_whole_run(record, ros_context, spin, manager, wait
     assert managed.shutdown() == (True, 'finalized')
 
 
-def of_this_process() -> tuple[int, int]:
-    return threading.active_count(), len(os.listdir('/proc/self/fd'))
-
-
 @pytest.mark.parametrize('node_class', [DepositionSimulator, RunRecorder])
 def test_repeated_cycles_leave_nothing_behind(start, manager, tmp_path, node_class):
     panel = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
@@ -226,6 +222,6 @@ def test_repeated_cycles_leave_nothing_behind(start, manager, tmp_path, node_cla
                            managed.cleanup):  # fmt: skip
             assert transition()[0]
         assert entities() == at_first
-        found.append(of_this_process())
+        found.append((threading.active_count(), len(os.listdir('/proc/self/fd'))))
     # The first cycle opens what stays open, shared by all nodes.
     assert all(now <= before for now, before in zip(found[-1], found[1], strict=True)), found

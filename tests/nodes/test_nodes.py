@@ -14,7 +14,7 @@ from nodes.cell import parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.parameters import NodeParameter
-from paint_deposition.nodes.topics import ColouredMesh, header, white_marker
+from paint_deposition.nodes.topics import coloured_mesh, header, white_marker
 from paint_deposition.report.colour_scales import FILM_PALETTE
 from test_packaging import NODES, table_of
 
@@ -49,7 +49,8 @@ def declared(ros_context, executor):
 
 
 def test_defaults_keep_their_types(declared):
-    node, values = declared()
+    # Those of rclpy are not ours.
+    node, values = declared(use_sim_time=False, **{'qos_overrides./tf.publisher.depth': 3})
     assert values == {name: row.default for name, row in TABLE.items()}
     described = {name: node.describe_parameter(name) for name in values}
     assert described['rate_hz'].type == ParameterType.PARAMETER_DOUBLE
@@ -116,10 +117,6 @@ def test_a_home_folder_is_found_at_the_start_and_later(declared, monkeypatch, tm
     assert 'Wrong parameter type' in result.reason
 
 
-def test_sim_time_and_qos_overrides_are_not_ours(declared):
-    declared(use_sim_time=False, **{'qos_overrides./tf.publisher.depth': 3})
-
-
 @pytest.mark.parametrize('node', NODES)
 def test_every_description_states_a_unit_and_every_fixed_one_why(node):
     for name, row in table_of(node).items():
@@ -137,10 +134,10 @@ STAMPS_NS = 0, 1_758_000_123_456_789_012
 def test_the_mesh_is_the_marker_that_rclpy_builds(frame_id, triangles):
     rng = np.random.default_rng(7)
     vertices, faces = rng.normal(size=(40, 3)), rng.integers(0, 40, size=(triangles, 3))
-    mesh = ColouredMesh(vertices, faces, frame_id, 'thickness')
+    mesh = coloured_mesh(vertices, faces, frame_id, 'thickness')
     for stamp_ns in STAMPS_NS:
         rows = rng.integers(0, len(FILM_PALETTE), size=len(vertices))
-        data = mesh.serialise(stamp_ns, FILM_PALETTE, rows)
+        data = mesh(stamp_ns, FILM_PALETTE, rows)
         expected = white_marker(Marker.TRIANGLE_LIST, 'thickness', 0, frame_id)
         expected.header = header(frame_id, stamp_ns)
         rgba = FILM_PALETTE[rows] / 255.0

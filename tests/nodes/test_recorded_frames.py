@@ -134,7 +134,7 @@ def test_the_recorded_run_of_a_conveyor_has_the_film_that_was_seen(
     read = read_recording(recorder.run.folder, state_topic=STATE_TOPIC)
     assert np.array_equal(offline_um(node, read), film)
     lost = len(MOTION) - len(read)
-    assert gun.poses_refused == lost
+    assert gun.refused_frames.total() == lost
     if quiet[1] - quiet[0] > 2_000_000_000:
         assert lost == pytest.approx(550, abs=10)
         assert 'tf has none for 2.2' in gun.refusal

@@ -6,7 +6,6 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
-from rclpy.time import Time
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from paint_deposition.files.recordings.bag_files import open_bag
@@ -18,13 +17,8 @@ NUMBERED = get_rmw_implementation_identifier() != 'rmw_cyclonedds_cpp'
 UNCOUNTED = ' (losses cannot be counted: this middleware does not number messages)'
 
 
-def pose(stamp_ns: int, x_m: float = 0.0, frame_id: str = 'door') -> PoseStamped:
-    message = PoseStamped()
-    message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-    message.header.frame_id = frame_id
-    message.pose.position.x = x_m
-    message.pose.orientation.w = 1.0
-    return message
+def pose(stamp_ns: int) -> PoseStamped:
+    return topics.pose_message('door', stamp_ns, [0.0] * 6 + [1.0])
 
 
 def finish(recorder: RunRecorder) -> dict:

@@ -265,7 +265,9 @@ def test_a_change_that_fails_is_none(simulated, painted, asked, wait_until, tmp_
     for step in (node.trigger_deactivate, node.trigger_cleanup):
         assert step() != TransitionCallbackReturn.SUCCESS
     assert node.active
-    assert node.reset() == (False, 'the part is being changed: call again after it')
+    refused = node.reset()
+    assert not refused.success
+    assert refused.message == 'the part is being changed: call again after it'
     source.send(MOTION, frame_id=frame)
     wait_until(future.done, what='the answer')
     assert not future.result().success
@@ -336,7 +338,7 @@ def test_poses_that_wait_are_of_their_part(simulator, robot, painted, asked, wai
     wait_until(lambda: node.parts.waiting, what='the request')
     source.send(later(MOTION))
     if placed:
-        node.frame.take_part_pose('cell', [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        node.frame.tree.place('part', 'cell', [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     wait_until(future.done, what='the change')
     answer = future.result()
     assert answer.success, answer.message

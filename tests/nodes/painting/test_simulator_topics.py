@@ -123,7 +123,7 @@ def test_poses_that_cannot_be_are_counted_and_no_more(simulated, painted, onlook
 def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulated, onlooker, wait_until):
     (node, source), viewer = simulated(), onlooker(STATS)
     source.send(MOTION, frame_id='base_link')
-    wait_until(lambda: node.inputs[0].poses_refused == len(MOTION))
+    wait_until(lambda: node.inputs[0].refused_frames.total() == len(MOTION))
     # tf knows none either, where it is installed.
     wait_until(lambda: viewer.reports(POSES, 'no transforms connect', b'\x02'))
     assert "they are in frame 'base_link'" in viewer.status(POSES).message

@@ -58,26 +58,25 @@ class PartFrame:
 
     They come from the parameter `part_pose`, and from tf where its messages are installed. A pose
     without a frame is taken to be in that of the part.
+
+    Attributes:
+        frame_id: of the part; tree: the transforms that are known.
+        tf_topics: the subscriptions to tf, which are polled; none where its messages are not
+            installed.
     """
 
     def __init__(self, node: PaintNode, frame_id: str) -> None:
         self.frame_id = frame_id.lstrip('/')
         self._node = node
         self._publisher: Publisher | None = None
-        self._tree = FrameTree(live=True)
-        # None where the messages of tf are not installed.
+        self.tree = FrameTree(live=True)
         self.tf_topics: list[AdaptiveSubscription] = []
         with contextlib.suppress(ImportError):
-            self.tf_topics = subscribe_to_tf(node, self._tree, self._take)
-
-    def take_pending(self) -> None:
-        """Take the transforms in the queues."""
-        for topic in self.tf_topics:
-            topic.take_pending()
+            self.tf_topics = subscribe_to_tf(node, self.tree, self._take)
 
     def _take(self, message: Any, _info: Any) -> None:
         for transform in transforms_of(message):
-            self._tree.add(*transform)
+            self.tree.add(*transform)
 
     def set_part_pose(self, parent_frame: str, part_pose: Sequence[float]) -> None:
         """Set the part's pose [x y z qx qy qz qw] in another frame, [] for none.
@@ -86,7 +85,7 @@ class PartFrame:
         """
         # As it is published, and so recorded: to the last bit.
         place = Rigid.of(part_pose).values if len(part_pose) else ()
-        self.take_part_pose(parent_frame, place)
+        self.tree.place(self.frame_id, parent_frame, place)
         # A recorder hears of it before there is a pose, which is then in the run of its part.
         if parent_frame and self._publisher is None:
             self._publisher = self._node.create_publisher(
@@ -100,10 +99,6 @@ class PartFrame:
         t.x, t.y, t.z, q.x, q.y, q.z, q.w = place
         self._publisher.publish(placed)
 
-    def take_part_pose(self, parent_frame: str, part_pose: Sequence[float]) -> None:
-        """The same as another node has published it."""
-        self._tree.place(self.frame_id, parent_frame, part_pose)
-
     def on_part(self, message: PoseStamped) -> Place:
         """A pose in the frame of the part.
 
@@ -114,9 +109,9 @@ class PartFrame:
         if is_frame(frame_id, self.frame_id):
             return pose
         try:
-            into_part = self._tree.lookup(frame_id, self.frame_id, stamp_ns(message.header))
+            into_part = self.tree.lookup(frame_id, self.frame_id, stamp_ns(message.header))
         except NoTransform as missing:
-            is_connected = self._tree.moving_between(frame_id, self.frame_id) is not None
+            is_connected = self.tree.moving_between(frame_id, self.frame_id) is not None
             remedy = 'set part_pose and part_parent_frame, or frame_id'
             if is_connected:
                 remedy = 'publish tf without gaps and by the clock of the poses'

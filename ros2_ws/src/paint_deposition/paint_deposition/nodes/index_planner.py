@@ -34,7 +34,7 @@ from paint_deposition.nodes.parameters import (
 )
 from paint_deposition.nodes.topics import header, pose_message
 from paint_deposition.planning.plan import Plan, kept_clear, plan
-from paint_deposition.planning.recommendation import Recommendation, recommend
+from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRequest
 
 # (stage, share of it that is done, 0 to 1); it raises CancelledError to cancel the work.
@@ -131,7 +131,26 @@ class IndexPlanner(PaintNode):
             response.message = self._last.message
             return response
         self._last = Status(OK, answer.sentence)
-        return _fill_response(response, answer)
+        response.success = True
+        response.message = '; '.join([answer.sentence, *answer.notes])
+        for name in ('index_m', 'sigma_n', 'mean_um', 'speed_m_per_s', 'travel'):
+            setattr(response, name, getattr(answer, name))
+        for name in ('tolerance', 'cycle_time_s'):
+            value = getattr(answer, name)
+            setattr(response, name, math.nan if value is None else value)
+        response.index_range_m = list(answer.index_range_m)
+        response.window_low_m = [low for low, _ in answer.windows_m]
+        response.window_high_m = [high for _, high in answer.windows_m]
+        response.minima_index_m = [minimum.index_m for minimum in answer.minima]
+        response.minima_sigma_n = [minimum.sigma_n for minimum in answer.minima]
+        response.passes = answer.passes or 0
+        response.curve_index_m = answer.curve.index_m.tolist()
+        response.curve_sigma_n = answer.curve.sigma_n.tolist()
+        for name in ('index_drift', 'standoff_drift'):
+            low, high = getattr(answer, f'{name}_m') or (math.nan, math.nan)
+            setattr(response, f'{name}_low_m', low)
+            setattr(response, f'{name}_high_m', high)
+        return response
 
     def _plan(
         self, changed: Mapping[str, Any], progress: Progress = lambda stage, share: None
@@ -228,30 +247,6 @@ class IndexPlanner(PaintNode):
             'requests': self._requests,
         }
         return Status(self._last.level, self._last.message, values)
-
-
-def _fill_response(
-    response: RecommendIndex.Response, answer: Recommendation
-) -> RecommendIndex.Response:
-    response.success = True
-    response.message = '; '.join([answer.sentence, *answer.notes])
-    for name in ('index_m', 'sigma_n', 'mean_um', 'speed_m_per_s', 'travel'):
-        setattr(response, name, getattr(answer, name))
-    for name in ('tolerance', 'cycle_time_s'):
-        value = getattr(answer, name)
-        setattr(response, name, math.nan if value is None else value)
-    response.index_range_m = list(answer.index_range_m)
-    response.window_low_m = [low for low, _ in answer.windows_m]
-    response.window_high_m = [high for _, high in answer.windows_m]
-    response.minima_index_m = [minimum.index_m for minimum in answer.minima]
-    response.minima_sigma_n = [minimum.sigma_n for minimum in answer.minima]
-    response.passes = answer.passes or 0
-    response.curve_index_m = answer.curve.index_m.tolist()
-    response.curve_sigma_n = answer.curve.sigma_n.tolist()
-    none = math.nan, math.nan
-    response.index_drift_low_m, response.index_drift_high_m = answer.index_drift_m or none
-    response.standoff_drift_low_m, response.standoff_drift_high_m = answer.standoff_drift_m or none
-    return response
 
 
 def _path_message(trajectory: Trajectory, start_ns: int) -> Path:

@@ -86,10 +86,8 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     def close(self) -> None:
         """Deactivate and clean up, if the node is active or configured."""
-        if self.active:
-            self._leave(self._deactivate)
-        if self.configured:
-            self._leave(self._cleanup)
+        while self.configured:
+            self._leave()
 
     def destroy_node(self) -> None:
         super().destroy_node()
@@ -101,16 +99,16 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     # --- transitions
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('configured', lambda: self._enter(self._load_and_configure))
+        return self._transition_result('configured', self._enter)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('activated', lambda: self._enter(self._activate))
+        return self._transition_result('activated', self._enter)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('deactivated', lambda: self._leave(self._deactivate), True)
+        return self._transition_result('deactivated', self._leave, True)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('cleaned up', lambda: self._leave(self._cleanup), True)
+        return self._transition_result('cleaned up', self._leave, True)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         return self._transition_result('shut down', self.close, True)
@@ -118,10 +116,6 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.close()
         return TransitionCallbackReturn.SUCCESS
-
-    def _load_and_configure(self) -> None:
-        self._load()
-        self.tasks = {**self._configure(), 'state': self._state_status}
 
     def _transition_result(
         self, done: str, transition: Callable[[], None], needs_rest: bool = False
@@ -141,37 +135,42 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
             self.get_logger().info(done)
         return TransitionCallbackReturn.SUCCESS
 
-    def _enter(self, step: Callable[[], None]) -> None:
+    def _enter(self) -> None:
+        """Configure the node, or activate it if it is configured."""
         before = self._entities
-        if not self.configured:
-            self._lasting = before
         self._created.append(set())
         try:
-            step()
+            if self.active:
+                self._activate()
+            else:
+                self._lasting = before
+                super()._start()
+                self.tasks = {**self._configure(), 'state': self._state_status}
         except BaseException:
             self._created.pop()
             self._destroy(self._entities - before)
             raise
         self._created[-1] = self._entities - before
 
-    def _leave(self, step: Callable[[], None]) -> None:
+    def _leave(self) -> None:
+        """Deactivate the node if it is active, else clean it up; a PaintError keeps its state."""
         stays = False
         try:
-            step()
+            if self.active:
+                self._deactivate()
+            else:
+                self._cleanup()
         except PaintError:
             stays = True
             raise
         finally:
             if not stays:
-                self._end_of_state()
-
-    def _end_of_state(self) -> None:
-        created = self._created.pop()
-        self._destroy(created if self.configured else self._entities - self._lasting)
-        if not self.configured:
-            # An aggregator would report a status that is no longer published as stale.
-            for task in self.tasks.keys() - {'state'}:
-                self.tasks[task] = lambda: Status(OK, 'the node is not configured')
+                created = self._created.pop()
+                self._destroy(created if self.configured else self._entities - self._lasting)
+            if not self.configured:
+                # An aggregator would report a status that is no longer published as stale.
+                for task in self.tasks.keys() - {'state'}:
+                    self.tasks[task] = lambda: Status(OK, 'the node is not configured')
 
     @property
     def _entities(self) -> set[Any]:

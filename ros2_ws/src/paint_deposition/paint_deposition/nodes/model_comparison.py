@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from geometry_msgs.msg import Point
 from paint_msgs.msg import ComparisonStats
+from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.errors import PaintError, ReadingsError
@@ -24,7 +25,7 @@ from paint_deposition.nodes.painting.health import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.parameters import CONFIGURED, NodeParameter, fixed
-from paint_deposition.nodes.topics import ColouredMesh, header
+from paint_deposition.nodes.topics import coloured_mesh, header
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, turned
 from paint_deposition.report.colour_scales import ColourScale, residual_scale
@@ -63,7 +64,7 @@ class ModelComparison(PaintingNode):
         self._mesh_publisher = latched(Marker, 'comparison/mesh')
         self._stats_publisher = latched(ComparisonStats, 'comparison/stats')
         self._legend_publisher = latched(MarkerArray, 'comparison/legend')
-        self.create_trigger_service('~/compare', self._compare)
+        self.create_service(Trigger, '~/compare', lambda *_: self._compare())
         self._publish_legend()
         self.publish()
         return painting_tasks(self) | {'comparison': self.status}
@@ -80,17 +81,15 @@ class ModelComparison(PaintingNode):
         super()._load_files()
 
     def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
-        def experiment_on(surface: Surface) -> Experiment:
-            return Experiment.of('live', surface, SprayPath.empty(), self.readings)
-
+        motionless = SprayPath.empty()
         try:
-            self._experiment = experiment_on(surface)
+            self._experiment = Experiment.of('live', surface, motionless, self.readings)
         except ReadingsError:
             # Until the gun tells which side of an open sheet is outward, readings with normals do.
             if self._is_read:
                 raise
             surface = turned(surface)
-            self._experiment = experiment_on(surface)
+            self._experiment = Experiment.of('live', surface, motionless, self.readings)
         self._is_read = True
         return surface, self._experiment.points
 
@@ -100,7 +99,7 @@ class ModelComparison(PaintingNode):
         for doubt in readings_in_doubt(surface, self.readings, np.zeros(len(self.readings))):
             self.get_logger().warning(doubt)
         frame_id = self.frame.frame_id
-        self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'residual')
+        self._mesh = coloured_mesh(surface.vertices_m, surface.faces, frame_id, 'residual')
         at = slice(len(self._experiment))
         places, normals = self.points.positions_m[at], self.points.normals[at]
         self._spreading = interpolation_matrix(surface, places, normals)
@@ -160,13 +159,13 @@ class ModelComparison(PaintingNode):
         at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
         scale = self._scale
         rows = scale.rows(self._spreading @ at_points, self._coloured)
-        self._mesh_publisher.publish(self._mesh.serialise(stamp_ns, scale.palette, rows))
+        self._mesh_publisher.publish(self._mesh(stamp_ns, scale.palette, rows))
 
     def _publish_legend(self) -> None:
         bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
         self._legend_publisher.publish(bar)
 
-    def _compare(self) -> tuple[bool, str]:
+    def _compare(self) -> Trigger.Response:
         """The comparison in one line."""
         self.catch_up()
         found = self.residuals()
@@ -181,7 +180,7 @@ class ModelComparison(PaintingNode):
         if doubt := zeros_in_doubt(self.readings, found.predicted_um):
             line += f'; {doubt}'
         self.get_logger().info(line)
-        return True, line
+        return Trigger.Response(success=True, message=line)
 
     def status(self) -> Status:
         found = self.residuals()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
 import os
 import signal
 import sys
@@ -27,10 +28,9 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.timer import Timer
-from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError, quoted
-from paint_deposition.nodes.parameters import ParameterTable, declare_parameters
+from paint_deposition.nodes.parameters import RUNS, ParameterTable, declare_parameters
 
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
@@ -62,7 +62,7 @@ class PaintNode(Node):
         stopped: whether the thread of this node is to end.
         tasks: the diagnostic tasks, by name.
         awaiting: number of requests whose work a thread does right now.
-        finished: a future that ends the process: its result is the exit code, or an exception.
+        finished: a future that ends the process, with an error if it has an exception.
     """
 
     NAME = 'paint_node'
@@ -89,12 +89,8 @@ class PaintNode(Node):
             super().destroy_node()
             raise
         self.add_on_set_parameters_callback(self._on_set_parameters)
-        self.add_post_set_parameters_callback(self._after_set_parameters)
 
     def _start(self) -> None:
-        self._load()
-
-    def _load(self) -> None:
         """Read the files; SIGINT and SIGTERM interrupt it."""
         PaintNode.loading = True
         PaintNode.end_if_loading()
@@ -128,10 +124,12 @@ class PaintNode(Node):
 
     def close(self) -> None:
         """Close files and the like. Called once, after the last callback; signals are ignored."""
-        self._end_thread()
+        self.stopped.set()
+        if self._thread is not None:
+            self._thread.join()
 
     def destroy_node(self) -> None:
-        self._end_thread()
+        PaintNode.close(self)
         super().destroy_node()
 
     # --- for all users
@@ -146,28 +144,14 @@ class PaintNode(Node):
             try:
                 work()
             except Exception as error:
-                self.fail(error)
+                self.finish(error)
 
         self._thread = threading.Thread(target=guarded, name=self.get_name(), daemon=True)
         self._thread.start()
 
-    def _end_thread(self) -> None:
-        self.stopped.set()
-        if self._thread is not None:
-            self._thread.join()
-
     def create_steady_timer(self, period_s: float, callback: Callable[[], Any]) -> Timer:
         """A timer that also runs while a simulated clock stands still."""
         return self.create_timer(period_s, callback, clock=self._steady)
-
-    def create_trigger_service(self, name: str, handle: Callable[[], tuple[bool, str]]) -> None:
-        """A std_srvs/Trigger service; `handle` returns success and message."""
-
-        def respond(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            response.success, response.message = handle()
-            return response
-
-        self.create_service(Trigger, name, respond)
 
     async def result_of(self, work: concurrent.futures.Future) -> Any:
         """Await work that a thread does; other callbacks run meanwhile."""
@@ -181,14 +165,16 @@ class PaintNode(Node):
         self.awaiting -= 1
         return work.result()
 
-    def finish(self, exit_code: int = 0) -> None:
-        """Ask the process to exit; the running callback is completed first."""
-        if not self.finished.done():
-            self.finished.set_result(exit_code)
+    def finish(self, error: Exception | None = None) -> None:
+        """Ask the process to exit; the running callback is completed first.
 
-    def fail(self, error: Exception) -> None:
-        """Ask the process to exit with an error, where raising it would not end the process."""
-        if not self.finished.done():
+        With an error where raising it would not end the process.
+        """
+        if self.finished.done():
+            return
+        if error is None:
+            self.finished.set_result(None)
+        else:
             self.finished.set_exception(error)
 
     def require_named_folder(self, file: str) -> None:
@@ -246,18 +232,26 @@ class PaintNode(Node):
     def set_parameters_atomically(
         self, parameter_list: list[Parameter[Any]]
     ) -> SetParametersResult:
-        """Refuse to change fixed parameters with the reason, which rclpy leaves out."""
-        for name in (change.name for change in parameter_list):
-            row = self.PARAMETERS.get(name)
-            if not row or not row.fixed_because:
-                continue
-            is_fixed = self.configured
-            if row.is_read_only:  # it can be set until its declaration is complete
-                is_fixed = self.describe_parameter(name).read_only
-            if is_fixed:
+        """Refuse to change fixed parameters with the reason, which rclpy leaves out.
+
+        A value in another type than that of its row, as 2 for 2.0, is set in that of the row.
+        """
+        changes: list[Parameter[Any]] = []
+        for change in parameter_list:
+            name, row = change.name, self.PARAMETERS.get(change.name)
+            if row and row.fixed_because and (self.configured or row.fixed_while == RUNS):
                 reason = f'{name} cannot change while the node {row.fixed_while}: '
                 return SetParametersResult(successful=False, reason=reason + row.fixed_because)
-        return super().set_parameters_atomically(parameter_list)
+            with contextlib.suppress(PaintError):  # what is invalid is refused as it is
+                if row:
+                    change = Parameter(name, row.ros_type, row.checked(name, change.value))
+            changes.append(change)
+        result = super().set_parameters_atomically(changes)
+        if result.successful:
+            self.values |= {change.name: change.value for change in changes}
+            if self.configured:
+                self._on_change({change.name for change in changes})
+        return result
 
     def set_parameters(self, parameter_list: list[Parameter[Any]]) -> list[SetParametersResult]:
         """Set each parameter on its own."""
@@ -275,11 +269,6 @@ class PaintNode(Node):
             reason = str(error) or 'not enough memory'
             return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
-
-    def _after_set_parameters(self, changes: list[Parameter]) -> None:
-        self.values |= {change.name: change.value for change in changes}
-        if self.configured:
-            self._on_change({change.name for change in changes})
 
 
 def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = None) -> int:
@@ -302,7 +291,18 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
         if received:
             return 0
         node = _create_node(make_node)
-        exit_code = _spin(node, received)
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        if not received:
+            node.get_logger().info('ready')
+        while not (received or node.finished.done()):
+            # Signals do not reach the main thread while it waits in the middleware.
+            executor.spin_once(timeout_sec=0.1)
+        executor.remove_node(node)
+        executor.shutdown(timeout_sec=5.0)
+        if node.finished.done():
+            node.finished.result()
+        exit_code = 0
     except Exception as error:
         exit_code = _report_error(error)
     finally:
@@ -341,19 +341,6 @@ def _create_node(make_node: Callable[[], PaintNode]) -> PaintNode:
 
 def _reason(error: RuntimeError) -> str:
     return ' '.join(str(error).split(', at /')[0].split())
-
-
-def _spin(node: PaintNode, signals: list[int]) -> int:
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-    if not signals:
-        node.get_logger().info('ready')
-    while not (signals or node.finished.done()):
-        # Signals do not reach the main thread while it waits in the middleware.
-        executor.spin_once(timeout_sec=0.1)
-    executor.remove_node(node)
-    executor.shutdown(timeout_sec=5.0)
-    return (node.finished.result() or 0) if node.finished.done() else 0
 
 
 def _report_error(error: Exception) -> int:

@@ -1,6 +1,5 @@
 """Tables of node parameters, from which they are declared, described and validated."""
 
-import contextlib
 import math
 import os
 import re
@@ -48,11 +47,6 @@ class NodeParameter:
     fixed_while: str = RUNS
 
     @property
-    def is_read_only(self) -> bool:
-        """Whether it cannot change in any state of the node."""
-        return bool(self.fixed_because) and self.fixed_while == RUNS
-
-    @property
     def is_path(self) -> bool:
         """Whether it names a file or a folder, or several."""
         return self.description.endswith('[path]')
@@ -70,7 +64,7 @@ class NodeParameter:
             type=self.ros_type.value,
             description=self.description,
             additional_constraints='; '.join(filter(None, texts)),
-            read_only=self.is_read_only,
+            read_only=bool(self.fixed_because) and self.fixed_while == RUNS,
         )
         low, high = self.bounds or (0, 0)
         if self.bounds and self.ros_type == Parameter.Type.INTEGER:
@@ -233,7 +227,7 @@ def fixed(because: str, fixed_while: str = RUNS, /, **rows: NodeParameter) -> Pa
 
 
 def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
-    """Declare every row on `node`, validate all later changes, and return the values.
+    """Declare every row on `node`, and return the values.
 
     Raises PaintError for an override that is invalid or that no row has; it names the nearest.
     """
@@ -244,9 +238,6 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
         if not name.startswith('qos_overrides.'):
             remedy = did_you_mean(name, table)
             raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
-    node.add_pre_set_parameters_callback(
-        lambda changes: [_typed(table.get(change.name), change) for change in changes]
-    )
     for name, row in table.items():
         try:
             value = row.checked(name, overrides.get(name, row.default))
@@ -259,18 +250,9 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
         writable = row.descriptor()
         writable.read_only = False
         node.declare_parameter(name, row.ros_type, writable, ignore_override=True)
-        node.set_parameters([Parameter(name, row.ros_type, [])])
+        Node.set_parameters(node, [Parameter(name, row.ros_type, [])])
         node.set_descriptor(name, row.descriptor())
     return {name: node.get_parameter(name).value for name in table}
-
-
-def _typed(row: NodeParameter | None, change: Parameter) -> Parameter:
-    """The change with its value in the type of the row; one that is invalid as it is."""
-    with contextlib.suppress(PaintError):
-        if row is not None:
-            value = row.checked(change.name, change.value)
-            return Parameter(change.name, row.ros_type, value)
-    return change
 
 
 def require_file_name(what: str, name: str) -> None:

@@ -44,6 +44,9 @@ MOST_PUBLISHERS = 1000
 OVERLAP_S = 1.0
 # The stamp of a header follows the four bytes that give the encoding of the message.
 STAMP_OFFSET = 4
+# (stamp [ns], palette (P, 4) uint8 RGBA, (V,) row of the palette for each vertex) -> a serialised
+# Marker, ready to be published.
+MeshMessage = Callable[[int, np.ndarray, np.ndarray], bytes]
 Quality = tuple[ReliabilityPolicy, DurabilityPolicy]
 USUAL = ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE
 
@@ -80,7 +83,8 @@ class AdaptiveSubscription:
             service as well; else by the executor, and `match_qos` is called now and then.
 
     Attributes:
-        lost: messages missing after the first of each publisher, by the numbers they have.
+        lost: messages missing after the first of each publisher, by the numbers they have; whoever
+            counts anew sets it to 0.
     """
 
     def __init__(
@@ -241,8 +245,10 @@ def header_stamp_ns(cdr: bytes) -> int:
     return nanoseconds(*struct.unpack_from('<iI' if little_endian else '>iI', cdr, STAMP_OFFSET))
 
 
-class ColouredMesh:
-    """A TRIANGLE_LIST Marker as serialised bytes; only stamp and colours change.
+def coloured_mesh(
+    vertices_m: np.ndarray, faces: np.ndarray, frame_id: str, namespace: str
+) -> MeshMessage:
+    """What makes the serialised TRIANGLE_LIST Markers of a mesh; only stamp and colours change.
 
     One of 100,000 triangles takes a second to build from Python objects. Here it is serialised
     once, and for each publication only its stamp and colours are rewritten in the bytes.
@@ -252,40 +258,30 @@ class ColouredMesh:
         frame_id: frame of the mesh.
         namespace: of the marker.
     """
+    corners = faces.ravel()
+    # The bytes before the count of the points and behind the colours are those of a small marker
+    # that the middleware has serialised, whose points and colours occur nowhere else in it.
+    # Alignment behind the arrays stays the same, since a corner takes 40 bytes.
+    places = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 9.3e8, 2.3e9]])
+    shades = np.arange(0.07, 0.9, 0.07, np.float32).reshape(3, 4)
+    marker = white_marker(Marker.TRIANGLE_LIST, namespace, 0, frame_id)
+    marker.points = [Point(x=x, y=y, z=z) for x, y, z in places.tolist()]
+    marker.colors = [ColorRGBA(r=r, g=g, b=b, a=a) for r, g, b, a in shades.tolist()]
+    sample = serialize_message(marker)
+    count = struct.pack('=I', len(places))
+    head = sample[: sample.rindex(count, 0, sample.index(places.tobytes()))]
+    tail = sample[sample.index(shades.tobytes()) + shades.nbytes :]
+    points = vertices_m[corners].astype(np.float64).tobytes()
+    count = struct.pack('=I', len(corners))
+    gap = b'\0' * (-(len(head) + len(count) - STAMP_OFFSET) % 8)
+    before_colours = head + count + gap + points + count
+    buffer = bytearray(before_colours) + bytes(16 * len(corners)) + tail
+    coloured = np.frombuffer(buffer, np.float32, 4 * len(corners), len(before_colours))
 
-    def __init__(
-        self, vertices_m: np.ndarray, faces: np.ndarray, frame_id: str, namespace: str
-    ) -> None:
-        self._corners = faces.ravel()
-        # The bytes before the count of the points and behind the colours are those of a small
-        # marker that the middleware has serialised, whose points and colours occur nowhere else in
-        # it. Alignment behind the arrays stays the same, since a corner takes 40 bytes.
-        places = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 9.3e8, 2.3e9]])
-        shades = np.arange(0.07, 0.9, 0.07, np.float32).reshape(3, 4)
-        marker = white_marker(Marker.TRIANGLE_LIST, namespace, 0, frame_id)
-        marker.points = [Point(x=x, y=y, z=z) for x, y, z in places.tolist()]
-        marker.colors = [ColorRGBA(r=r, g=g, b=b, a=a) for r, g, b, a in shades.tolist()]
-        sample = serialize_message(marker)
-        count = struct.pack('=I', len(places))
-        head = sample[: sample.rindex(count, 0, sample.index(places.tobytes()))]
-        tail = sample[sample.index(shades.tobytes()) + shades.nbytes :]
-        points = vertices_m[self._corners].astype(np.float64).tobytes()
-        count = struct.pack('=I', len(self._corners))
-        gap = b'\0' * (-(len(head) + len(count) - STAMP_OFFSET) % 8)
-        before_colours = head + count + gap + points + count
-        self._buffer = bytearray(before_colours)
-        self._buffer += bytes(16 * len(self._corners)) + tail
-        self._colours = np.frombuffer(
-            self._buffer, np.float32, 4 * len(self._corners), len(before_colours)
-        ).reshape(-1, 4)
-
-    def serialise(self, stamp_ns: int, palette: np.ndarray, rows: np.ndarray) -> bytes:
-        """The message, ready to be published.
-
-        Args:
-            palette: (P, 4) uint8 RGBA. rows: (V,) row of the palette for each vertex.
-        """
+    def message(stamp_ns: int, palette: np.ndarray, rows: np.ndarray) -> bytes:
         colours = (palette / np.float32(255.0)).astype(np.float32)
-        np.take(colours, rows[self._corners], axis=0, out=self._colours, mode='clip')
-        struct.pack_into('=iI', self._buffer, STAMP_OFFSET, *divmod(int(stamp_ns), 1_000_000_000))
-        return bytes(self._buffer)
+        np.take(colours, rows[corners], axis=0, out=coloured.reshape(-1, 4), mode='clip')
+        struct.pack_into('=iI', buffer, STAMP_OFFSET, *divmod(int(stamp_ns), 1_000_000_000))
+        return bytes(buffer)
+
+    return message

@@ -1,6 +1,7 @@
 """Node `web_view`: the film as it is painted, on a page for browsers."""
 
 import contextlib
+import math
 import os
 import sys
 import time
@@ -65,25 +66,24 @@ class WebView(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__(**kwargs)
-        results = topics.RESULTS
+        results, compared = topics.RESULTS, partial(setattr, self, '_comparison')
         for message, topic, take, profile in (
             (Part, topics.PART_TOPIC, self._take_part, topics.LATCHED),
             (TransformStamped, PART_POSE_TOPIC, self._take_part_pose, topics.LATCHED),
             (ThicknessField, 'thickness/field', self._take_field, results),
             (ThicknessStats, 'thickness/stats', self._take_stats, topics.LATCHED),
-            (ComparisonStats, 'comparison/stats', self._take_comparison, topics.LATCHED),
+            (ComparisonStats, 'comparison/stats', compared, topics.LATCHED),
             (DiagnosticStatus, topics.TRUST_TOPIC, self._take_trust, topics.LATCHED),
         ):
             self.create_subscription(message, topic, take, profile)
         self._inputs = [
             AdaptiveSubscription(
-                self, message, gun_topic(name, topic), partial(take, name), depth=500,
+                self, message, gun_topic(name, topic), partial(self._take_input, name), depth=500,
                 latched=message is AtomizerState,
             )
             for name in self.values['atomizers'] or ['']
-            for message, topic, take in (
-                (AtomizerState, 'atomizer/state', self._take_state),
-                (PoseStamped, 'atomizer/pose', self._take_pose),
+            for message, topic in (
+                (AtomizerState, 'atomizer/state'), (PoseStamped, 'atomizer/pose'),
             )
         ]  # fmt: skip
         # At 1 kHz fifty poses wait at most.
@@ -101,7 +101,7 @@ class WebView(PaintNode):
         }
         # Stamp of the newest figures; their time, which goes on where a stream is restarted.
         self._newest_ns, self._time_s = 0, 0.0
-        self._rmse_um = float('nan')
+        self._comparison = ComparisonStats(rmse_um=math.nan)
         # What makes the film doubtful, '' if nothing does, and when the simulator said so.
         self._doubts, self._trusted_s = '', time.monotonic()
         self._problem = ''
@@ -171,10 +171,7 @@ class WebView(PaintNode):
         if now_ns:  # there was a pose
             self._time_s += max(now_ns - (self._newest_ns or now_ns), 0) * 1e-9
             self._newest_ns = now_ns
-            self.scene.add_figures(self._time_s, stats, self._rmse_um)
-
-    def _take_comparison(self, stats: ComparisonStats) -> None:
-        self._rmse_um = stats.rmse_um
+            self.scene.add_figures(self._time_s, stats, self._comparison.rmse_um)
 
     def _take_trust(self, trust: DiagnosticStatus) -> None:
         self._doubts = '' if trust.level == OK else trust.message
@@ -196,8 +193,7 @@ class WebView(PaintNode):
     # --- the guns
 
     def _take_motion(self) -> None:
-        self._frame.take_pending()
-        for topic in self._inputs:
+        for topic in (*self._frame.tf_topics, *self._inputs):
             topic.take_pending()
         for gun, waiting in self._waiting.items():
             for pose, placed in placed_in_order(waiting, self._frame.on_part, time.monotonic()):
@@ -212,14 +208,14 @@ class WebView(PaintNode):
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
         for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
-            self._frame.take_part_pose(parent, pose)
+            self._frame.tree.place(self._frame.frame_id, parent, pose)
 
-    def _take_state(self, gun: str, state: AtomizerState, _info: Any) -> None:
+    def _take_input(self, gun: str, message: PoseStamped | AtomizerState, _info: Any) -> None:
+        if isinstance(message, PoseStamped):
+            self._waiting[gun].append((time.monotonic(), message))
+            return
         with contextlib.suppress(PaintError):  # the simulator, which refuses it, says so
-            self._flow[gun] = trigger_change(state).flow
-
-    def _take_pose(self, gun: str, message: PoseStamped, _info: Any) -> None:
-        self._waiting[gun].append((time.monotonic(), message))
+            self._flow[gun] = trigger_change(message).flow
 
     def status(self) -> Status:
         sent, now_s = self.page.bytes_sent, time.monotonic()

@@ -3,8 +3,7 @@
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from collections.abc import Iterable, Iterator
 from heapq import merge
 from itertools import groupby
 from operator import attrgetter
@@ -20,6 +19,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings import messages as definitions
@@ -110,8 +110,8 @@ class BagPlayer(PaintNode):
         if self.values['publish_clock']:
             self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
             self.create_steady_timer(0.01, self._publish_clock)
-        self.create_trigger_service('~/pause', partial(self._set_running, False))
-        self.create_trigger_service('~/resume', partial(self._set_running, True))
+        self.create_service(Trigger, '~/pause', lambda *_: self._set_running(False))
+        self.create_service(Trigger, '~/resume', lambda *_: self._set_running(True))
         self._subscribers_to_await = self.values['wait_for_subscribers']
         window = self.values['window']
         self._flow_control = FlowControl(self, self._pose_publisher, window, self.stopped)
@@ -146,12 +146,16 @@ class BagPlayer(PaintNode):
             else:
                 self._motion = motion_of(bag, *motion)
             self._state_topic: BagTopic | None = None
+            self._states_are_current = False
             unused = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
             if values['state_topic']:
                 self._state_topic = choose_state_topic(bag, values['state_topic'])
                 if self._state_topic.type == BOOL_TYPE:
                     # Raises an error unless recorder and robot had the same clock.
                     trajectory_of(bag, motion[0], values['state_topic'], *motion[1:])
+                else:
+                    today = definitions.installed(STATE_TYPE).type_hash
+                    self._states_are_current = bag.type_hash(self._state_topic) == today
             elif unused:
                 self.get_logger().info(
                     f'no state_topic: the gun always sprays; the bag has {" ".join(unused)}'
@@ -186,12 +190,14 @@ class BagPlayer(PaintNode):
 
     # --- called by the executor
 
-    def _set_running(self, running: bool) -> tuple[bool, str]:
+    def _set_running(self, running: bool) -> Trigger.Response:
         changes = self._time.running != running
         self._time.change(running=running)
-        if running:
-            return changes, 'resumed' if changes else 'not paused'
-        return changes, 'paused' if changes else 'already paused'
+        if changes:
+            message = 'resumed' if running else 'paused'
+        else:
+            message = 'not paused' if running else 'already paused'
+        return Trigger.Response(success=changes, message=message)
 
     def status(self) -> Status:
         if self._clock_publisher and self.count_publishers('/clock') > 1:
@@ -220,7 +226,6 @@ class BagPlayer(PaintNode):
     def _play_once(self) -> None:
         begun = False
         with open_bag(self.values['bag']) as bag:
-            as_state = state_converter(bag, self._state_topic)
             for message in self._messages(bag):
                 if not begun:
                     begun = True
@@ -231,11 +236,11 @@ class BagPlayer(PaintNode):
                 # Wait for the end of a pause, the time of the message, and the flow control.
                 self._time.wait_for(message.log_time_ns, self.stopped)
                 if self.values['rate'] == 0.0:
-                    self._flow_control.wait_for_room()
+                    self._flow_control.wait_for_lag_below(self.values['window'])
                     self._time.change(time_ns=message.log_time_ns)
                 if self.stopped.is_set():
                     return
-                self._publish(message, as_state)
+                self._publish(message, bag)
         self._time.change(started=False)
         self._publish_clock()
 
@@ -259,7 +264,7 @@ class BagPlayer(PaintNode):
         for _, simultaneous in groupby(messages, key=log_time):
             yield from sorted(simultaneous, key=lambda each: each.topic == self._pose_topic)
 
-    def _publish(self, message: RawMessage, as_state: Callable[[RawMessage], bytes]) -> None:
+    def _publish(self, message: RawMessage, bag: Bag) -> None:
         if message.topic == self._pose_topic:
             self._flow_control.add_sent(header_stamp_ns(message.cdr), time.monotonic())
             self._pose_publisher.publish(message.cdr)
@@ -271,37 +276,31 @@ class BagPlayer(PaintNode):
         elif message.topic in self._transform_topics:
             self._transform_publishers[message.topic.endswith(STATIC)].publish(message.cdr)
         else:
-            self._state_publisher.publish(as_state(message))
+            self._state_publisher.publish(self._state_of(message, bag))
             self.states_published += 1
+
+    def _state_of(self, message: RawMessage, bag: Bag) -> AtomizerState | bytes:
+        """A recorded Bool or state as the message of today, or its bytes if it is one."""
+        if self._states_are_current:
+            return message.cdr
+        state = unknown_state()
+        if message.type == BOOL_TYPE:
+            state.header = header('', message.log_time_ns)
+            state.spraying = deserialize_message(message.cdr, Bool).data
+            state.flow = relative_flow(state.spraying)
+            return state
+        # Of another version of the message, fields of the same name are copied.
+        recorded = bag.decode(message)
+        state.header = header(recorded.header.frame_id, stamp_ns(recorded.header))
+        state.spraying = bool(recorded.spraying)
+        state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
+        for name, kind in state.get_fields_and_field_types().items():
+            if kind == 'double':
+                setattr(state, name, float(getattr(recorded, name, math.nan)))
+        return state
 
     def _publish_clock(self) -> None:
         with self._clock_order:
             time_ns = self._time.time_ns
             if self._clock_publisher and time_ns is not None:
                 self._clock_publisher.publish(Clock(clock=Time(nanoseconds=time_ns).to_msg()))
-
-
-def state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:
-    """What makes the bytes of an AtomizerState from a recorded Bool or state."""
-    is_bool = states is None or states.type == BOOL_TYPE
-    own_hash = definitions.installed(STATE_TYPE).type_hash
-    if states is not None and not is_bool and bag.type_hash(states) == own_hash:
-        return lambda message: message.cdr
-
-    def as_state(message: RawMessage) -> bytes:
-        state = unknown_state()
-        if is_bool:
-            state.header = header('', message.log_time_ns)
-            state.spraying = deserialize_message(message.cdr, Bool).data
-            state.flow = relative_flow(state.spraying)
-        else:  # another version of the message: fields of the same name are copied
-            recorded = bag.decode(message)
-            state.header = header(recorded.header.frame_id, stamp_ns(recorded.header))
-            state.spraying = bool(recorded.spraying)
-            state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
-            for name, kind in state.get_fields_and_field_types().items():
-                if kind == 'double':
-                    setattr(state, name, float(getattr(recorded, name, math.nan)))
-        return serialize_message(state)
-
-    return as_state

@@ -63,16 +63,15 @@ class ReplayClock:
     def wait_for(self, time_ns: int, stopped: threading.Event) -> None:
         """Wait for that time, at rate 0 only for the end of a pause; no longer once stopped."""
         with self._changed:
-            while (left_s := self._remaining_s(time_ns)) > 0.0 and not stopped.is_set():
+            while not stopped.is_set():
+                now_ns, left_s = self.time_ns, math.inf
+                if self._rate == 0.0 and self.running:
+                    left_s = 0.0
+                elif self._since_s is not None and now_ns is not None:
+                    left_s = (time_ns - now_ns) * 1e-9 / self._rate
+                if left_s <= 0.0:
+                    break
                 self._changed.wait(min(left_s, 0.05))
-
-    def _remaining_s(self, time_ns: int) -> float:
-        if self._rate == 0.0:
-            return 0.0 if self.running else math.inf
-        now_ns = self.time_ns
-        if self._since_s is None or now_ns is None:
-            return math.inf
-        return (time_ns - now_ns) * 1e-9 / self._rate
 
 
 @dataclass
@@ -201,19 +200,14 @@ class FlowControl:
             if count < wanted and now_s - logged_s > LOG_PERIOD_S:
                 logged_s = now_s
                 topic = self._publisher.topic_name
-                self._log_status(f'waiting for {wanted} subscribers on {topic}, {count} there')
+                self.status = f'waiting for {wanted} subscribers on {topic}, {count} there'
+                self._node.get_logger().info(self.status)
             self._stopped.wait(0.1)
         self._discover()
 
-    def wait_for_room(self) -> None:
-        """Wait until one more pose fits into the window."""
-        if self._sent % self._window == 0:
-            self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN)
-        self._wait_for_lag_below(self._window)
-
     def wait_until_taken(self) -> None:
         """Wait until every pose is taken or known to be lost."""
-        self._wait_for_lag_below(1)
+        self.wait_for_lag_below(1)
         deadline_s = time.monotonic() + LOG_PERIOD_S
         while not self._stopped.is_set() and time.monotonic() < deadline_s:
             if self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN):
@@ -222,7 +216,10 @@ class FlowControl:
             if subscriber.lost:
                 self._node.get_logger().warning(f'{name} has lost {subscriber.lost} poses')
 
-    def _wait_for_lag_below(self, limit: int) -> None:
+    def wait_for_lag_below(self, limit: int) -> None:
+        """Wait until all subscribers that are waited for have fewer poses to take than that."""
+        if self._sent % self._window == 0:
+            self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN)
         logged_s = time.monotonic()
         while not self._stopped.is_set():
             now_s = time.monotonic()
@@ -241,10 +238,7 @@ class FlowControl:
             if now_s - logged_s > LOG_PERIOD_S:
                 logged_s = now_s
                 late = ', '.join(f'{name}, {count} poses behind' for name, count in behind.items())
-                self._log_status(f'waiting for {late}')
+                self.status = f'waiting for {late}'
+                self._node.get_logger().info(self.status)
             self._stopped.wait(0.001)
         self.status = 'playing'
-
-    def _log_status(self, status: str) -> None:
-        self.status = status
-        self._node.get_logger().info(status)

@@ -116,7 +116,7 @@ class RecordedTopic(AdaptiveSubscription):
         depth: int,
     ) -> None:
         self.run_topic, self.name = run_topic, run_topic.name
-        self.messages = self.lost = self._log_time_ns = self.sent_ns = 0
+        self.messages = self._log_time_ns = self.sent_ns = 0
         # How each publisher was first heard: number of the message, when it was sent, and how
         # long after the begin of the run; and how many came before, by its rate.
         self._first: dict[bytes, tuple[int, int, int]] = {}
@@ -130,8 +130,8 @@ class RecordedTopic(AdaptiveSubscription):
 
     def reset_counts(self, begun_ns: int) -> None:
         """Set the counts of the run, which began then, to zero."""
-        self._begun_ns, self._lost_before = begun_ns, self.lost
-        self.unnumbered = self.gaps = 0
+        self._begun_ns = begun_ns
+        self.lost = self.unnumbered = self.gaps = 0
         self.longest_gap_ns = self.newest_stamp_ns = 0
         self._first = {gid: (number, sent, 0) for gid, (number, sent, _) in self._first.items()}
         self._before_first.clear()
@@ -139,11 +139,6 @@ class RecordedTopic(AdaptiveSubscription):
     def unsubscribe(self) -> None:
         super().unsubscribe()
         self._first.clear()
-
-    @property
-    def missed(self) -> int:
-        """Messages lost in the run after the first one of their publisher."""
-        return self.lost - self._lost_before
 
     @property
     def before_discovery(self) -> int:
@@ -157,7 +152,7 @@ class RecordedTopic(AdaptiveSubscription):
             return 'losses cannot be counted'
         first = self.before_discovery
         before = f', {first} {MISSED_BEFORE_DISCOVERY}' if first else ''
-        return f'{self.missed} missed{before}'
+        return f'{self.lost} missed{before}'
 
     def _record(self, cdr: bytes, info: Mapping[str, Any]) -> None:
         self.messages += 1
@@ -165,7 +160,16 @@ class RecordedTopic(AdaptiveSubscription):
         if number is None or publisher is None:
             self.unnumbered += 1
         else:
-            self._count_before_first(publisher['data'], number, info)
+            # What it sent in the run before it was heard is told by how often it sends.
+            gid, sent_ns = publisher['data'], info['source_timestamp']
+            if gid not in self._first and len(self._first) < MOST_PUBLISHERS:
+                waited_ns = max(info['received_timestamp'] - self._begun_ns, 0)
+                self._first[gid] = number, sent_ns, waited_ns
+            first, first_sent_ns, waited_ns = self._first.get(gid, (number, 0, 0))
+            # The first few tell.
+            if 0 < number - first <= 50:
+                period_ns = max((sent_ns - first_sent_ns) / (number - first), 1.0)
+                self._before_first[gid] = int(min(first - 1, waited_ns / period_ns))
         if self._max_gap_ns is not None:
             before_ns, self.newest_stamp_ns = self.newest_stamp_ns, header_stamp_ns(cdr)
             gap_ns = self.newest_stamp_ns - before_ns
@@ -176,18 +180,6 @@ class RecordedTopic(AdaptiveSubscription):
         self._log_time_ns = max(self._log_time_ns, info['received_timestamp'])
         self.sent_ns = info['source_timestamp']
         self._pass_on(self.name, cdr, self._log_time_ns, self.sent_ns)
-
-    def _count_before_first(self, publisher: bytes, number: int, info: Mapping[str, Any]) -> None:
-        """Count what a publisher sent in the run before it was heard, by how often it sends."""
-        sent_ns = info['source_timestamp']
-        if publisher not in self._first and len(self._first) < MOST_PUBLISHERS:
-            waited_ns = max(info['received_timestamp'] - self._begun_ns, 0)
-            self._first[publisher] = number, sent_ns, waited_ns
-        first, first_sent_ns, waited_ns = self._first.get(publisher, (number, 0, 0))
-        # The first few tell.
-        if 0 < number - first <= 50:
-            period_ns = max((sent_ns - first_sent_ns) / (number - first), 1.0)
-            self._before_first[publisher] = int(min(first - 1, waited_ns / period_ns))
 
 
 def bag_qos(profile: QoSProfile) -> Qos:

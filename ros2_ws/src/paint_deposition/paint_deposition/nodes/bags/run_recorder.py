@@ -10,6 +10,7 @@ from pathlib import Path
 
 from paint_msgs.msg import Part, PoseProgress
 from rclpy.serialization import deserialize_message
+from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
@@ -71,7 +72,7 @@ class RunRecorder(ManagedNode):
             poses: self.create_publisher(PoseProgress, gun_topic(gun, PROGRESS_TOPIC), PROGRESS)
             for gun, (poses, _) in motion.items()
         }
-        self.create_trigger_service('~/stop', self._stop)
+        self.create_service(Trigger, '~/stop', lambda *_: self._stop())
         return {'recording': self.status}
 
     def _activate(self) -> None:
@@ -255,7 +256,7 @@ class RunRecorder(ManagedNode):
     def _record_failure(self, error: RecordingError) -> None:
         self._error = error
         self.get_logger().error(str(error))
-        self.fail(error)
+        self.finish(error)
 
     def _report_progress(self) -> None:
         for name in self._progress.keys() & self.recorded.keys():
@@ -266,14 +267,15 @@ class RunRecorder(ManagedNode):
 
     # --- ending
 
-    def _stop(self) -> tuple[bool, str]:
+    def _stop(self) -> Trigger.Response:
         if self.active:
             self.trigger_deactivate()
         # The answer of a process that ends at once may be lost; its client would wait for ever.
         self.create_steady_timer(1.0, self.finish)
         if not self.runs:
-            return True, 'nothing was recorded: the recorder was never activated'
-        return self.run.complete, self.summary()
+            message = 'nothing was recorded: the recorder was never activated'
+            return Trigger.Response(success=True, message=message)
+        return Trigger.Response(success=self.run.complete, message=self.summary())
 
     def _deactivate(self) -> None:
         for topic in self.recorded.values():
@@ -298,7 +300,7 @@ class RunRecorder(ManagedNode):
     @property
     def _losses(self) -> str:
         topics = self.recorded.values()
-        missed = sum(topic.missed for topic in topics)
+        missed = sum(topic.lost for topic in topics)
         lost = f', {missed} missed' if missed else ''
         first = [f'{t.before_discovery} of {t.name}' for t in topics if t.before_discovery]
         lost += f', {" and ".join(first)} {MISSED_BEFORE_DISCOVERY}' if first else ''
@@ -334,7 +336,7 @@ class RunRecorder(ManagedNode):
             return Status(ERROR, f'not recorded: {" ".join(sorted(self._refused))}', values)
         if free < 1_000_000_000:
             return Status(WARN, 'the disk is almost full', values)
-        if self._too_late or any(topic.missed for topic in topics):
+        if self._too_late or any(topic.lost for topic in topics):
             return Status(WARN, f'messages were missed{self._losses}', values)
         return Status(OK, 'recording', values)
 

@@ -6,6 +6,7 @@ import math
 import time
 from collections import Counter, deque
 from functools import partial
+from heapq import merge
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
@@ -106,14 +107,9 @@ class AtomizerInput:
         node.create_steady_timer(0.2, self._report_progress)
 
     @property
-    def poses_refused(self) -> int:
-        """Poses refused for their frame since the last reset."""
-        return sum(self.refused_frames.values())
-
-    @property
     def messages_lost(self) -> int:
         """Messages that the middleware has lost since the last reset."""
-        return sum(topic.lost for topic in self._topics) - self._lost_before
+        return sum(topic.lost for topic in self._topics)
 
     def reset(self) -> None:
         """Reset the counts; poses that were not painted yet are dropped."""
@@ -131,7 +127,8 @@ class AtomizerInput:
         self.anomalies: Counter[str] = Counter()
         self.state_errors: set[str] = set()
         self.unpainted = 0
-        self._lost_before = sum(topic.lost for topic in self._topics)
+        for topic in self._topics:
+            topic.lost = 0
         self.intervals = Intervals()
         self.jumps = Jumps()
 
@@ -171,19 +168,22 @@ class AtomizerInput:
 
         They are painted at once, or when they fill a batch or have waited for long enough.
         """
-        self._node.frame.take_pending()
-        for topic in self._topics:
+        for topic in (*self._node.frame.tf_topics, *self._topics):
             topic.take_pending()
         # Latched states may come behind others that were sent later.
-        poses, states = [*self._new_poses], deque(sorted(self._new_states, key=itemgetter(1)))
+        poses, states = [*self._new_poses], sorted(self._new_states, key=itemgetter(1))
         self._new_poses.clear()
         self._new_states.clear()
-        for pose, sent_ns in poses:
-            while states and states[0][1] < sent_ns:
-                self._take_state(*states.popleft())
-            self._take_pose(pose, sent_ns)
-        for state in states:
-            self._take_state(*state)
+        # Poses stay in the order in which they came.
+        for message, sent_ns in merge(poses, states, key=itemgetter(1)):
+            if isinstance(message, PoseStamped):
+                self._note_pose(message, sent_ns)
+            else:
+                state_ns = stamp_ns(message.header)
+                # Before its poses after a pause, too: the next pose tells.
+                if self._newest is None or state_ns - stamp_ns(self._newest.header) > AHEAD_NS:
+                    self._state_ahead = state_ns, sent_ns
+            self._process(message, sent_ns)
 
         has_waited = time.monotonic() - self._flushed_s >= 0.05
         if at_once or has_waited or len(self._poses) >= POSES_PER_BATCH:
@@ -228,7 +228,7 @@ class AtomizerInput:
 
     # --- poses
 
-    def _take_pose(self, message: PoseStamped, sent_ns: int) -> None:
+    def _note_pose(self, message: PoseStamped, sent_ns: int) -> None:
         self.poses_received += 1
         if len(message.header.frame_id) > LONGEST_NAME:
             message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
@@ -239,7 +239,6 @@ class AtomizerInput:
                 self.anomalies[f'{ahead}: set the clocks'] += 1
             self._state_ahead = None
         self.pose_s = time.monotonic()
-        self._process(message, sent_ns)
         if self.poses_received % POSES_PER_BATCH == 0:
             self._report_progress()
 
@@ -263,13 +262,6 @@ class AtomizerInput:
             self.refused_frames[frame_id] += 1
 
     # --- states
-
-    def _take_state(self, message: AtomizerState, sent_ns: int) -> None:
-        state_ns = stamp_ns(message.header)
-        # Before its poses after a pause, too: the next pose tells.
-        if self._newest is None or state_ns - stamp_ns(self._newest.header) > AHEAD_NS:
-            self._state_ahead = state_ns, sent_ns
-        self._process(message, sent_ns)
 
     def _switch(self, message: AtomizerState) -> None:
         try:

@@ -8,6 +8,7 @@ from typing import Any
 
 from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
+from std_srvs.srv import Trigger
 
 from paint_deposition.nodes.node import Task
 from paint_deposition.nodes.painting.film_display import (
@@ -15,7 +16,7 @@ from paint_deposition.nodes.painting.film_display import (
     laid_by_gun,
     statistics_of,
 )
-from paint_deposition.nodes.painting.health import FilmTrust, painting_tasks
+from paint_deposition.nodes.painting.health import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
@@ -73,7 +74,6 @@ class DepositionSimulator(PaintingNode):
         self.display = FilmDisplay(self)
         self.parts = PartChange(self, self._mesh_version, self._saving, saving)
         self.publish()
-        self.trust = FilmTrust(self)
         return painting_tasks(self, self.display.diagnostic_values) | {'part': self.parts.status}
 
     def _cleanup(self) -> None:
@@ -89,10 +89,11 @@ class DepositionSimulator(PaintingNode):
         super()._validate(values, changed)
         require_display(values)
 
-    def reset(self) -> tuple[bool, str]:
+    def reset(self) -> Trigger.Response:
         """Clear the film and all counts; a new run begins, if there were poses."""
         if self.parts.waiting:
-            return False, 'the part is being changed: call again after it'
+            message = 'the part is being changed: call again after it'
+            return Trigger.Response(success=False, message=message)
         self.catch_up()
         # First, since poses that come meanwhile are of the new run.
         if self.film.counts.received:

@@ -1,4 +1,4 @@
-"""The publishers of the simulator's film: statistics, legend, mesh, cloud and field."""
+"""The publishers of the simulator's film: statistics, legend, trust, mesh, cloud and field."""
 
 import sys
 import time
@@ -8,8 +8,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Vector3
-from paint_msgs.msg import ThicknessField, ThicknessStats
+from paint_msgs.msg import PoseProgress, ThicknessField, ThicknessStats
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
@@ -19,11 +20,28 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FIGURES, FilmStatistics, film_statistics
 from paint_deposition.nodes import topics
+from paint_deposition.nodes.node import OK, WARN
+from paint_deposition.nodes.painting.atomizer_input import LONGEST_NAME, MOST_NAMES
+from paint_deposition.nodes.painting.health import (
+    DOUBTFUL,
+    UNPAINTED,
+    sprays_without_poses,
+    what_was_wrong,
+)
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.topics import ColouredMesh, gun_topic, header, white_marker
+from paint_deposition.nodes.topics import (
+    PROGRESS_TOPIC,
+    MeshMessage,
+    coloured_mesh,
+    gun_topic,
+    header,
+    node_name,
+    white_marker,
+)
 from paint_deposition.part.points import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
@@ -116,7 +134,11 @@ class LargeTopic:
 
 
 class FilmDisplay:
-    """Publishes `thickness/...`: statistics, legend, and the large messages if subscribed to."""
+    """Publishes `thickness/...`: statistics, legend, and the large messages if subscribed to.
+
+    `thickness/trust` is sent twice a second. Nodes that report the poses they have taken on
+    `atomizer/progress`, as a recorder does, must not fall behind.
+    """
 
     def __init__(self, node: PaintingNode) -> None:
         self._node = node
@@ -135,7 +157,7 @@ class FilmDisplay:
             )
         }
         self._surface: Surface | None = None
-        self._mesh: ColouredMesh | None = None
+        self._mesh: MeshMessage | None = None
         self._stats = ThicknessStats()
         self._counts: tuple | None = None
         # Counts the films shown, and changes of their colours.
@@ -144,12 +166,54 @@ class FilmDisplay:
         self._scale = film_scale(self._film_um)
         self._legend_ends: tuple[float, float] | None = None
         self._publish_duration_s = 0.0
+        # Of each gun and reporter: stamp of its newest pose, and when it said so.
+        self._reports: dict[tuple[str, str], tuple[int, float]] = {}
+        self._trust = node.create_publisher(DiagnosticStatus, topics.TRUST_TOPIC, topics.LATCHED)
+        for source in node.inputs:
+            topic = gun_topic(source.name, PROGRESS_TOPIC)
+            take = partial(self._take_report, source.name)
+            node.create_subscription(PoseProgress, topic, take, topics.PROGRESS)
+        node.create_steady_timer(0.5, self._publish_trust)
 
     def diagnostic_values(self) -> dict[str, object]:
         """Values for the diagnostics of the film."""
         parts = zip(self._stats.atomizers, self._stats.atomizer_share, strict=True)
         each = {f'share of {gun}': f'{share:.1%}' for gun, share in parts if gun}
         return {'last publication [ms]': f'{self._publish_duration_s * 1e3:.0f}', **each}
+
+    def _take_report(self, gun: str, report: PoseProgress) -> None:
+        key = gun, report.reporter[:LONGEST_NAME]
+        own = report.reporter == self._node.get_fully_qualified_name()
+        if not own and (key in self._reports or len(self._reports) < MOST_NAMES):
+            self._reports[key] = stamp_ns(report.header), time.monotonic()
+
+    def _publish_trust(self) -> None:
+        """Publish whether all that was sent is in the film, and why not."""
+        node, doubts = self._node, []
+        for source, film in zip(node.inputs, node.film.guns, strict=True):
+            wrong = what_was_wrong(source, film) | {UNPAINTED: source.unpainted}
+            found = [f'{n} {words}' for words, n in wrong.items() if n and words in DOUBTFUL]
+            found += sprays_without_poses(source)
+            topic = node.resolve_topic_name(gun_topic(source.name, PROGRESS_TOPIC))
+            present = {node_name(info) for info in node.get_publishers_info_by_topic(topic)}
+            for (gun, name), (newest_ns, heard_s) in tuple(self._reports.items()):
+                behind_s = 1e-9 * (source.newest_ns - newest_ns)
+                if gun == source.name and name not in present:  # it has ended
+                    del self._reports[gun, name]
+                elif gun == source.name and time.monotonic() - heard_s > 3.0:
+                    found.append(f'{name} has stalled, or is inactive')
+                elif gun == source.name and newest_ns and behind_s > 2.0:
+                    found.append(f'{name} is {behind_s:.0f} s behind')
+            doubts += [f'{source.name}: {doubt}' if source.name else doubt for doubt in found]
+        if node.model_problem:
+            doubts.append(node.model_problem)
+        self._trust.publish(
+            DiagnosticStatus(
+                level=WARN if doubts else OK, name=topics.TRUST_TOPIC,
+                message='; '.join(doubts) or 'all that was sent is in the film',
+                hardware_id=node.get_fully_qualified_name(),
+            )
+        )  # fmt: skip
 
     def show(self, film: CommonFilm, changed: bool, run: str) -> None:
         """Publish the film if it has changed, or to new subscribers."""
@@ -159,12 +223,21 @@ class FilmDisplay:
         at = header(self._node.frame.frame_id, self._node.film.newest_ns or 0)
         if changed:
             self._update_stats(film, run, at)
-        self._publish_large(film, at)
+        film_um, surface = self._film_um, self._node.surface
+        make: dict[str, Callable[[], Any]] = {
+            'thickness/mesh': lambda: self._mesh_message(at.frame_id),
+            'thickness/cloud': lambda: cloud_message(surface, film_um, at),
+            'thickness/field': lambda: field_message(surface, film_um, at),
+        }
+        for gun, topic in enumerate(self._share_topics):
+            make[topic] = partial(lambda k: field_message(surface, film.shares_um[k], at), gun)
+        for topic, message in make.items():
+            self._large[topic].publish_if_wanted(self._version, message)
         if changed:
             self._publish_duration_s = time.monotonic() - began_s
         # The statistics are published when a count has changed, too.
         node, message = self._node, self._stats
-        refused = sum(source.poses_refused for source in node.inputs)
+        refused = sum(source.refused_frames.total() for source in node.inputs)
         counts = node.film.counts
         longest_s = max(source.intervals.longest_ns for source in node.inputs) * 1e-9
         now = counts.received + refused, counts.rejected + refused, counts.gaps, longest_s
@@ -197,25 +270,13 @@ class FilmDisplay:
             self._legend_ends = ends
             self._legend.publish(legend(self._scale, 'µm', node.surface, at.frame_id))
 
-    def _publish_large(self, film: CommonFilm, at: Header) -> None:
-        film_um, surface = self._film_um, self._node.surface
-        make: dict[str, Callable[[], Any]] = {
-            'thickness/mesh': lambda: self._mesh_message(at.frame_id),
-            'thickness/cloud': lambda: cloud_message(surface, film_um, at),
-            'thickness/field': lambda: field_message(surface, film_um, at),
-        }
-        for gun, topic in enumerate(self._share_topics):
-            make[topic] = partial(lambda k: field_message(surface, film.shares_um[k], at), gun)
-        for topic, message in make.items():
-            self._large[topic].publish_if_wanted(self._version, message)
-
     def _mesh_message(self, frame_id: str) -> bytes:
         surface = self._node.surface
         if self._mesh is None:
-            self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
+            self._mesh = coloured_mesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
         is_painted = self._film_um > self._node.values['painted_above_um']
         rows = self._scale.rows(self._film_um, is_painted)
-        return self._mesh.serialise(self._node.film.newest_ns or 0, self._scale.palette, rows)
+        return self._mesh(self._node.film.newest_ns or 0, self._scale.palette, rows)
 
 
 def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> MarkerArray:

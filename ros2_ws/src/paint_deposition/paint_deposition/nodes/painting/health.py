@@ -1,4 +1,4 @@
-"""The diagnostics of the nodes that paint, and whether their film can be trusted."""
+"""The diagnostics of the nodes that paint, and what puts their film in doubt."""
 
 import math
 import time
@@ -6,21 +6,16 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticStatus
-from paint_msgs.msg import PoseProgress
 
-from paint_deposition.files.recordings.messages import STATE_TYPE, stamp_ns
+from paint_deposition.files.recordings.messages import STATE_TYPE
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.nodes import topics
 from paint_deposition.nodes.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.painting.atomizer_input import (
-    LONGEST_NAME,
-    MOST_NAMES,
     STATES_REFUSED,
     AtomizerInput,
 )
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.topics import PROGRESS_TOPIC, gun_topic, node_name
+from paint_deposition.nodes.topics import gun_topic
 
 # Without poses for so long, a gun that sprays is reported.
 SILENT_S = 2.0
@@ -61,7 +56,7 @@ def what_was_wrong(source: AtomizerInput, film: LiveFilm) -> dict[str, int]:
         'steps faster than a robot': source.jumps.count,
         **source.anomalies,
         LOST: source.messages_lost,
-        REFUSED: source.poses_refused,
+        REFUSED: source.refused_frames.total(),
     }
 
 
@@ -77,7 +72,7 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         gun = f'spraying, flow {film.flow:g}' + (f', brush {film.brush}' if film.brush else '')
     values: dict[str, object] = {
         'poses taken': counts.received,
-        'poses refused': counts.rejected + source.poses_refused,
+        'poses refused': counts.rejected + wrong[REFUSED],
         **wrong,
         'longest interval [s]': f'{source.intervals.longest_ns * 1e-9:.3f}',
         'intervals over 1.5 times the usual one': source.intervals.long,
@@ -100,7 +95,7 @@ def poses_status(node: PaintingNode, number: int) -> Status:
     if source.refused_frames and time.monotonic() - source.refused_s < 5.0:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
         words = (
-            f'{source.poses_refused} poses refused: they are in frame {frames}, the mesh is in '
+            f'{wrong[REFUSED]} poses refused: they are in frame {frames}, the mesh is in '
             f"'{node.frame.frame_id}' and {source.refusal}"
         )
         return Status(ERROR, words, values)
@@ -164,58 +159,3 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
         remedy = 'poses may be lost; use a larger max_edge_length_m'
         return Status(WARN, f'{share}: {remedy}', values)
     return Status(OK, 'preparing a changed model' if node.repainting else 'up to date', values)
-
-
-class FilmTrust:
-    """Publishes `thickness/trust`, latched and twice a second: the level and the reasons.
-
-    Nodes that report the poses they have taken on `atomizer/progress`, as a recorder does, must
-    not fall behind.
-    """
-
-    def __init__(self, node: PaintingNode) -> None:
-        self._node = node
-        # Of each gun and reporter: stamp of its newest pose, and when it said so.
-        self._reports: dict[tuple[str, str], tuple[int, float]] = {}
-        self._publisher = node.create_publisher(
-            DiagnosticStatus, topics.TRUST_TOPIC, topics.LATCHED
-        )
-        for source in node.inputs:
-            topic = gun_topic(source.name, PROGRESS_TOPIC)
-            take = partial(self._take_report, source.name)
-            node.create_subscription(PoseProgress, topic, take, topics.PROGRESS)
-        node.create_steady_timer(0.5, self.publish)
-
-    def publish(self) -> None:
-        """Publish the status of the film as it is now."""
-        node, doubts = self._node, []
-        for source, film in zip(node.inputs, node.film.guns, strict=True):
-            wrong = what_was_wrong(source, film) | {UNPAINTED: source.unpainted}
-            found = [f'{n} {words}' for words, n in wrong.items() if n and words in DOUBTFUL]
-            found += sprays_without_poses(source)
-            topic = node.resolve_topic_name(gun_topic(source.name, PROGRESS_TOPIC))
-            present = {node_name(info) for info in node.get_publishers_info_by_topic(topic)}
-            for (gun, name), (newest_ns, heard_s) in tuple(self._reports.items()):
-                behind_s = 1e-9 * (source.newest_ns - newest_ns)
-                if gun == source.name and name not in present:  # it has ended
-                    del self._reports[gun, name]
-                elif gun == source.name and time.monotonic() - heard_s > 3.0:
-                    found.append(f'{name} has stalled, or is inactive')
-                elif gun == source.name and newest_ns and behind_s > 2.0:
-                    found.append(f'{name} is {behind_s:.0f} s behind')
-            doubts += [f'{source.name}: {doubt}' if source.name else doubt for doubt in found]
-        if node.model_problem:
-            doubts.append(node.model_problem)
-        self._publisher.publish(
-            DiagnosticStatus(
-                level=WARN if doubts else OK, name=topics.TRUST_TOPIC,
-                message='; '.join(doubts) or 'all that was sent is in the film',
-                hardware_id=node.get_fully_qualified_name(),
-            )
-        )  # fmt: skip
-
-    def _take_report(self, gun: str, report: PoseProgress) -> None:
-        key = gun, report.reporter[:LONGEST_NAME]
-        own = report.reporter == self._node.get_fully_qualified_name()
-        if not own and (key in self._reports or len(self._reports) < MOST_NAMES):
-            self._reports[key] = stamp_ns(report.header), time.monotonic()

@@ -4,11 +4,11 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from rclpy.timer import Timer
+from std_srvs.srv import Trigger
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
@@ -41,6 +41,7 @@ class Repainting:
         from_start: whether to repaint the motion so far.
 
     Attributes:
+        logs: the motion so far of each gun, to which poses are added meanwhile.
         prepared: the films, or an error, once the thread has ended.
         aborted: set it to stop as soon as possible, but after a compilation under way.
     """
@@ -48,8 +49,8 @@ class Repainting:
     def __init__(
         self, current: LiveFilms, make: Callable[[], LiveFilms], from_start: bool
     ) -> None:
-        self._logs = [gun.log for gun in current.guns]
-        self._make, self._from_start = make, from_start
+        self.logs, self.from_start = [gun.log for gun in current.guns], from_start
+        self._make = make
         self.aborted = threading.Event()
         self.prepared: Future[LiveFilms] = Future()
         threading.Thread(target=self._run, name='repainting', daemon=True).start()
@@ -58,7 +59,7 @@ class Repainting:
         try:
             films = self._make()
             films.warm_up()
-            repainted = zip(films.guns, self._logs, strict=True) if self._from_start else ()
+            repainted = zip(films.guns, self.logs, strict=True) if self.from_start else ()
             for film, log in repainted:
                 # The rest is for the thread of the executor, which must not be blocked.
                 while log.poses - film.log.poses > 250 and log.complete:
@@ -67,29 +68,8 @@ class Repainting:
                             return
                         film.replay([event])
             self.prepared.set_result(films)
-        except BaseException as error:  # raised again by `result`
+        except BaseException as error:  # raised again where the films are adopted
             self.prepared.set_exception(error)
-
-    def result(self, current: LiveFilms) -> LiveFilms | None:
-        """The films to continue with, up to date; call it once they are ``prepared``.
-
-        Returns:
-            The new films, or ``current`` with the new models if the motion so far is not
-            repainted. None if the motion was restarted meanwhile: repaint again.
-
-        Raises:
-            Exception: whatever was raised in the thread.
-        """
-        films = self.prepared.result()
-        if not self._from_start or not all(log.complete for log in self._logs):
-            for gun, prepared in zip(current.guns, films.guns, strict=True):
-                gun.switch_model(prepared.model)
-            return current
-        if any(gun.log is not log for gun, log in zip(current.guns, self._logs, strict=True)):
-            return None
-        for film, gun in zip(films.guns, current.guns, strict=True):
-            film.replay(gun.log.events(film.log.poses, film.log.changes))
-        return films
 
 
 class PaintingNode(ManagedNode, ABC):
@@ -120,7 +100,7 @@ class PaintingNode(ManagedNode, ABC):
         if self.autostarting:  # messages received before the node is active are painted
             self.hold()
         self._shown = None
-        self.create_trigger_service('~/reset', self.reset)
+        self.create_service(Trigger, '~/reset', lambda *_: self.reset())
         self.create_steady_timer(0.1, self._update)
         self.show_timer = self._new_show_timer()
         return {}
@@ -175,7 +155,7 @@ class PaintingNode(ManagedNode, ABC):
         film = self._unpainted(surface, points, self.models)
         film.warm_up()
         facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # builds the tree for a gun's rays
-        return PreparedPart(surface, points, film, zones)
+        return surface, points, film, zones
 
     def _unpainted(
         self, surface: Surface, points: SurfacePoints, models: Iterable[DepositionModel]
@@ -188,8 +168,8 @@ class PaintingNode(ManagedNode, ABC):
 
     def _take_part(self, part: PreparedPart) -> None:
         """Paint this part from now on."""
-        self.surface, self.points, self.zones = part.surface, part.points, part.zones
-        self.film, self._shown = part.film, None
+        self.surface, self.points, self.film, self.zones = part
+        self._shown = None
         self._guns_to_orient = list(range(len(self.gun_names)))
         self._surface_changed()
 
@@ -222,21 +202,21 @@ class PaintingNode(ManagedNode, ABC):
         Raises:
             ModelError: the model does not have the brush that a gun sprays with.
         """
-        film = part.film
+        surface, points, film, zones = part
         if any(new.model != now for new, now in zip(film.guns, self.models, strict=True)):
-            film = self._unpainted(part.surface, part.points, self.models)
+            film = self._unpainted(surface, points, self.models)
         for new, old in zip(film.guns, self.film.guns, strict=True):
             new.trigger_latency_s = self.values['trigger_latency_s']
             new.reset_keeping_trigger_of(old)
         for source in self.inputs:
             source.reset_counts()
         self.mesh_file, self.files_in_use = mesh_file, self._files
-        self._take_part(replace(part, film=film))
+        self._take_part((surface, points, film, zones))
         if self.repainting is not None:
             self._repaint()
 
-    def reset(self) -> tuple[bool, str]:
-        """Clear the film and all counts; returns success and message."""
+    def reset(self) -> Trigger.Response:
+        """Clear the film and all counts."""
         poses = self.film.counts.received
         for source in self.inputs:
             source.reset()
@@ -245,7 +225,8 @@ class PaintingNode(ManagedNode, ABC):
             self._repaint()
         self._shown = None
         self.publish()
-        return True, f'bare metal again; {poses} poses forgotten'
+        message = f'bare metal again; {poses} poses forgotten'
+        return Trigger.Response(success=True, message=message)
 
     def catch_up(self) -> None:
         """Paint all poses received, and adopt a repainted film if there is one."""
@@ -346,17 +327,26 @@ class PaintingNode(ManagedNode, ABC):
         return self.surface
 
     def _adopt(self, repainting: Repainting) -> None:
+        """Go on with the films that are prepared, or with the models where only they change."""
         self.repainting = None
         self.model_problem = ''
+        guns, logs = self.film.guns, repainting.logs
         try:
-            film = repainting.result(self.film)
+            films = repainting.prepared.result()
+            if not repainting.from_start or not all(log.complete for log in logs):
+                for gun, prepared in zip(guns, films.guns, strict=True):
+                    gun.switch_model(prepared.model)
+            elif any(gun.log is not log for gun, log in zip(guns, logs, strict=True)):
+                self._repaint()  # the motion was restarted meanwhile
+                return
+            else:
+                for film, gun in zip(films.guns, guns, strict=True):
+                    film.replay(gun.log.events(film.log.poses, film.log.changes))
+                self.film = films
         except (Exception, SystemExit) as error:  # of a user's effect; the old model stays
             self.model_problem = f'the new model is not used: {error}'
             self.get_logger().error(self.model_problem)
             self.models = tuple(gun.model for gun in self.film.guns)
             self._files = self.files_in_use
             return
-        if film is None:
-            self._repaint()
-        else:
-            self.film, self.files_in_use = film, self._files
+        self.files_in_use = self._files

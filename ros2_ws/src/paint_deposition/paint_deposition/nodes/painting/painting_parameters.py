@@ -1,7 +1,6 @@
 """The parameters that nodes with a film share, and the models, parts and films built from them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,9 @@ from paint_deposition.nodes.parameters import (
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
+
+# A part ready to be painted: its refined surface, points on it, unpainted film, and zones.
+PreparedPart = tuple[Surface, SurfacePoints, LiveFilms, PointZones | None]
 
 
 def model_parameters(use: str) -> dict[str, NodeParameter]:
@@ -152,16 +154,6 @@ def models_from_parameters(
     models = tuple(model_from_parameters({**values, 'model_file': file}, load) for file in files)
     require_same_film_effects(dict(zip(guns, models, strict=True)))
     return models
-
-
-@dataclass(frozen=True)
-class PreparedPart:
-    """A part ready to be painted: its refined surface, points on it, unpainted film, and zones."""
-
-    surface: Surface
-    points: SurfacePoints
-    film: LiveFilms
-    zones: PointZones | None
 
 
 def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:

@@ -65,12 +65,13 @@ class PartChange:
         group: CallbackGroup,
     ) -> None:
         self._node, self._version, self._saving = node, version, saving
+        self._folder = Path(node.values['output_directory'])
         self.part = Part(mesh_file=node.mesh_file, coat=1)
         # The run of the part and coat, and how often the film was reset since.
         self._run, self._resets = '', 0
         self._since = datetime.now(timezone.utc)
         present: Future[PreparedPart] = Future()
-        present.set_result(PreparedPart(node.surface, node.points, node.film, node.zones))
+        present.set_result((node.surface, node.points, node.film, node.zones))
         self._parts = {version: present}
         self._reading = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
         self.waiting = False
@@ -137,8 +138,9 @@ class PartChange:
                 response.success = not await self._change(request, response)
             elif request.mesh_file:
                 mesh_file = os.path.expanduser(request.mesh_file)
-                part = await self._node.result_of(self._prepared(mesh_version(mesh_file)))
-                response.message = f'{mesh_file} is prepared: {part.surface!r}'
+                prepared = self._prepared(mesh_version(mesh_file))
+                surface, *_ = await self._node.result_of(prepared)
+                response.message = f'{mesh_file} is prepared: {surface!r}'
                 response.success = True
             else:
                 raise PaintError('prepare needs a mesh_file: name the mesh to read ahead of time')
@@ -263,7 +265,7 @@ class PartChange:
                 f"serial '{part.serial}' is the part in the cell: set coat: true for another "
                 'coat on it, or give the serial number of the next part'
             )
-        folder = self._folder(following.run)
+        folder = self._folder / following.run
         if folder.exists():
             raise PaintError(
                 f'{folder} already exists: a part has one run for each coat, and none is '
@@ -310,13 +312,10 @@ class PartChange:
             del self._parts[kept]
         return part
 
-    def _folder(self, run: str) -> Path:
-        return Path(self._node.values['output_directory']).expanduser() / run
-
     def _film_writer(self) -> Callable[[], list[Path]]:
         part, node = self.part, self._node
         if not part.serial:
-            return node.film_writer(self._folder(''), time.strftime('film_%Y%m%d_%H%M%S'))
+            return node.film_writer(self._folder, time.strftime('film_%Y%m%d_%H%M%S'))
         described = {
             **{name: getattr(part, name) for name in ('type', 'serial', 'coat', 'run')},
             'since': self._since.isoformat(timespec='milliseconds'),
@@ -324,7 +323,7 @@ class PartChange:
             'part_pose': list(node.values['part_pose'] or []),
             'gap_s': self._gap_s,
         }
-        return node.film_writer(self._folder(part.run), 'film', described)
+        return node.film_writer(self._folder / part.run, 'film', described)
 
     def _save_films(self) -> list[Path]:
         """Save the films that are not on disk, the oldest first, in the thread for that."""
