@@ -10,7 +10,7 @@ import numpy as np
 from hypothesis.stateful import RuleBasedStateMachine
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from paint_msgs.msg import PoseProgress
+from paint_msgs.msg import AtomizerState, PoseProgress
 from std_srvs.srv import Trigger
 
 from brushes import NARROW, WIDE, two_brushes
@@ -73,7 +73,13 @@ class NodesOfACell(RuleBasedStateMachine):
         # Stamps of the poses that were sent for the part in the cell, but for those refused.
         self.of_part: list[int] = []
         self.stamp_ns = self.gun_ns = time.time_ns() + 3_600_000_000_000
+        self.told_ns = 0  # when the last state was sent, at the earliest
         self.run, self.is_whole, self.weak, self.recorder = '', False, None, None
+
+    def tell(self, state: AtomizerState) -> None:
+        """Send a state of the gun."""
+        self.told_ns = time.time_ns()
+        self.robot.state_publisher.publish(state)
 
     def make_nodes(self) -> None:
         def made(kind, **values):
@@ -140,9 +146,11 @@ class NodesOfACell(RuleBasedStateMachine):
         assert self.call(ChangeState, f'{node}/change_state', transition=wanted).success
 
     def settle(self) -> None:
-        """All that was sent is painted."""
+        """All that was sent is painted, and the gun is as it was told."""
         if self.active:
             self.wait_until(lambda: self.painted == self.sent, what='all painted')
+        (gun,) = self.simulator.inputs
+        self.wait_until(lambda: gun.state_sent_ns >= self.told_ns, what='the last state')
         self.simulator.catch_up()
 
     @property

@@ -47,7 +47,7 @@ class Cell(NodesOfACell):
         self.make_nodes()
         self.start_recorder()
         self.change_part(0, 0, 0, False)
-        self.robot.send_state(self.stamp_ns, 1.0, 1)
+        self.state(1.0, 1, 0)
 
     @precondition(lambda self: self.active)
     @rule(count=counts, wait=st.booleans())
@@ -72,7 +72,8 @@ class Cell(NodesOfACell):
           ahead_ms=st.sampled_from([0, 1, 50, 300]))  # fmt: skip
     def state(self, flow: float, brush: int, ahead_ms: int) -> None:
         self.gun_ns = max(self.gun_ns, self.stamp_ns + ahead_ms * 1_000_000)
-        self.robot.send_state(self.gun_ns, flow, brush)
+        self.tell(AtomizerState(header=header('', self.gun_ns), spraying=flow > 0.0, flow=flow,
+                                brush=brush))  # fmt: skip
 
     @precondition(lambda self: self.active)
     @rule(odd=st.sampled_from([
@@ -109,7 +110,7 @@ class Cell(NodesOfACell):
         state.header = header('', self.gun_ns)
         if 'sec' in odd:
             state.header.stamp.sec, state.header.stamp.nanosec = odd['sec'], 0
-        self.robot.state_publisher.publish(state)
+        self.tell(state)
 
     @rule(step_s=st.sampled_from([-3600.0, -2.0, -0.4, 0.1, 2.0, 3600.0]))
     def set_clock(self, step_s: float) -> None:
