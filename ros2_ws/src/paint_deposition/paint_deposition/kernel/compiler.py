@@ -54,15 +54,12 @@ def compiler_for(kind: str) -> Callable[..., Any]:
         def _get_host_cpu_features(self) -> str:
             return features
 
-    class Context(CPUContext):
-        def init(self) -> None:
-            super().init()
-            self._internal_codegen = Code(name)
-
     class Descriptor(CPUTarget):
         @cached_property
-        def _toplevel_target_context(self) -> Context:
-            return Context(self.typing_context, self._target_name)
+        def _toplevel_target_context(self) -> CPUContext:
+            context = CPUContext(self.typing_context, self._target_name)
+            context._internal_codegen = Code(name)
+            return context
 
     class Dispatcher(CPUDispatcher):
         targetdescr = Descriptor(name)
@@ -83,18 +80,6 @@ njit = compiler_for(KIND)
 
 
 Compiled = TypeVar('Compiled', bound=Callable[..., Any])
-
-
-def identity(laws: Sequence[Callable[..., float]], *variant: object) -> str:
-    """A name for the code of laws, of everything that is compiled with them, and the variant.
-
-    Compiled code refers to the laws' modules by name, so those names are part of it: the module
-    of a user's own effect is named by its source.
-    """
-    parts = [_code_around(), repr((numba.__version__, variant)).encode()]
-    for law in laws:
-        parts.extend(_compiled_with(law, set()))
-    return hashlib.sha256(b'\0'.join(parts)).hexdigest()[:24]
 
 
 @cache
@@ -145,8 +130,13 @@ def named_for_its_code(
     processes that compile different variants at once cannot swap them. What the function calls
     must be defined before it, and it must not enclose compiled functions: those differ in every
     process, so that nothing would be found again. ``laws`` are the functions whose code makes it
-    another than others of its name, by default its own; ``variant`` is what else does.
+    another than others of its name, by default its own; ``variant`` is what else does. Compiled
+    code refers to the laws' modules by name, so those names count too: the module of a user's own
+    effect is named by its source.
     """
-    functions = [function] if laws is None else laws
-    function.__qualname__ = f'{function.__qualname__}-{identity(functions, *variant)}'
+    parts = [_code_around(), repr((numba.__version__, variant)).encode()]
+    for law in [function] if laws is None else laws:
+        parts.extend(_compiled_with(law, set()))
+    digest = hashlib.sha256(b'\0'.join(parts)).hexdigest()[:24]
+    function.__qualname__ = f'{function.__qualname__}-{digest}'
     return function

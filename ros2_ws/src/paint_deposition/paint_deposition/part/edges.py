@@ -4,7 +4,6 @@ Half-edge h = 3 f + k runs from corner k of triangle f to its next corner.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -67,26 +66,19 @@ def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return edges, of_half_edge.reshape(-1, 3)
 
 
-@dataclass(frozen=True)
-class Edges:
-    """Which half-edges lie on each other."""
+def matched_half_edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which half-edges of (F, 3) faces lie on each other.
 
-    # (E, 2) of two triangles with the same winding, in the order of their vertices.
-    paired: np.ndarray
-    clashing: np.ndarray  # (C, 2) of two triangles of opposite winding
-    single: np.ndarray  # (B,) those without a partner, or with several
-
-    @staticmethod
-    def of(faces: np.ndarray) -> 'Edges':
-        """Match the edges of (F, 3) faces."""
-        order, first = half_edges_by_edge(faces)
-        count = np.diff(first)
-        two = first[:-1][count == 2]
-        pairs = np.stack([order[two], order[two + 1]], axis=1)
-        corners = faces.ravel()
-        opposed = corners[pairs[:, 0]] != corners[pairs[:, 1]]
-        single = np.sort(order[np.repeat(count != 2, count)])
-        return Edges(pairs[opposed], pairs[~opposed], single)
+    (E, 2) of two triangles with the same winding, in the order of their vertices; (C, 2) of two
+    of opposite winding, which clash; and (B,) those without a partner, or with several.
+    """
+    order, first = half_edges_by_edge(faces)
+    count = np.diff(first)
+    two = first[:-1][count == 2]
+    pairs = np.stack([order[two], order[two + 1]], axis=1)
+    corners = faces.ravel()
+    opposed = corners[pairs[:, 0]] != corners[pairs[:, 1]]
+    return pairs[opposed], pairs[~opposed], np.sort(order[np.repeat(count != 2, count)])
 
 
 def next_half_edge(half_edges: np.ndarray) -> np.ndarray:

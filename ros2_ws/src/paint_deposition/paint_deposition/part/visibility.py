@@ -181,7 +181,13 @@ class Occluder:
         1 on flat and convex surface. The fixed set of SKY_RAYS directions resolves 0.002 where
         only the lowest sky is hidden, as in the shallow recesses of a door.
         """
-        sky, weights = _sky()
+        # Directions (3, SKY_RAYS) about +z. The sky below elevation e has weight sin(e)^2; with
+        # t = sin(e) in equal strata rays lie close together near the horizon, where they are
+        # needed. Strata are shifted from azimuth to azimuth.
+        azimuth, stratum = np.divmod(np.arange(SKY_RAYS), ELEVATIONS)
+        t = (stratum + 0.5 * (np.sqrt(5.0) - 1.0) * azimuth % 1.0) / ELEVATIONS
+        angle, across = 2.0 * np.pi * (azimuth + 0.5) / AZIMUTHS, np.sqrt(1.0 - t**2)
+        sky, weights = np.stack([across * np.cos(angle), across * np.sin(angle), t]), t / t.sum()
         horizon = self.horizon_sines(points_m, normals)
         open_share = np.empty(len(points_m))
         rows = 1_000_000 // SKY_RAYS
@@ -207,16 +213,3 @@ class Occluder:
             query='OCCLUDED',
         )
         return hits >= 0
-
-
-def _sky() -> tuple[np.ndarray, np.ndarray]:
-    """(3, SKY_RAYS) directions about +z and their cosine weights (SKY_RAYS,), which sum to 1.
-
-    The sky below elevation e has weight sin(e)^2; with t = sin(e) in equal strata rays lie close
-    together near the horizon, where they are needed. Strata are shifted from azimuth to azimuth.
-    """
-    azimuth, stratum = np.divmod(np.arange(SKY_RAYS), ELEVATIONS)
-    t = (stratum + 0.5 * (np.sqrt(5.0) - 1.0) * azimuth % 1.0) / ELEVATIONS
-    angle = 2.0 * np.pi * (azimuth + 0.5) / AZIMUTHS
-    across = np.sqrt(1.0 - t**2)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), t]), t / t.sum()
