@@ -68,7 +68,7 @@ class Case:
             tool = self.path.rotation[row]
             emission = self.path.position_m[row] - offset * tool[:, 2]
             x, y, z = ((self.points.positions_m - emission) @ tool).T
-            inside = (z > offset) & (np.hypot(x, y) * omega < MODEL.reach_m * z)
+            inside = (z > offset) & (np.hypot(x, y) * omega < MODEL.reach_of_m(MODEL.planar) * z)
             shares.append(inside.mean())
         return float(np.mean(shares))
 

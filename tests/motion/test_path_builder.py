@@ -42,7 +42,7 @@ def streamed(trajectory, sizes, whole_strokes=False, lag_ns=100_000_000):
             builder.add_trigger(*triggers.pop(0))
         pieces.append(builder.take(newest - lag_ns))
     pieces.append(builder.take(finish=True))
-    return SprayPath.joined(pieces), builder.counts
+    return SprayPath.joined(pieces), builder.screen.counts
 
 
 def to_and_fro(times_s=TIMES_S):

@@ -5,7 +5,7 @@ come in. The film is the same to the last bit.
 """
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -17,7 +17,7 @@ from paint_deposition.errors import ModelError
 from paint_deposition.film import layout
 from paint_deposition.film.statistics import PaintUsed
 from paint_deposition.kernel.blocks import LARGEST_BLOCK, shared_among_threads
-from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
+from paint_deposition.kernel.eq2_flux import CENTRE, REACH, RING, TERMS, Law, compile_kernel
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
@@ -88,9 +88,15 @@ class FilmIntegrator:
         # Absent effects are left out rather than computed: they change nothing, to the bit.
         self._effects = [effect for effect in model.effects if not effect.is_neutral]
         compiled = model.effects if self._keep_absent_laws else self._effects
-        *laws, parameters = layout.compiled_laws(compiled)
+        # Each law with how many parameters it takes; one unused number where there are none.
+        laws: list[tuple[tuple[Law, int], ...]] = []
+        parameters: list[float] = []
+        for kind in ('flux_factor', 'pattern_scale'):
+            chosen = [(e, law) for e in compiled if (law := getattr(type(e), kind)) is not None]
+            laws.append(tuple((law, len(effect.values())) for effect, law in chosen))
+            parameters += [value for effect, _ in chosen for value in effect.values()]
         self._variant = (*laws, self._shadowed, self._real)
-        self._parameters = parameters.astype(self._real)
+        self._parameters = np.array(parameters or [0.0], dtype=self._real)
 
     def reset(self) -> None:
         """Back to bare metal."""
@@ -142,7 +148,11 @@ class FilmIntegrator:
         See ``layout.term_weights``. They depend on r, sigma1 and sigma2, and where the asymmetry
         is spread over the ring, but not on K1 and K2.
         """
-        constants, none = layout.term_constants(self.model), np.empty(0)
+        # Constants with which the terms are kept apart, whatever their gains.
+        even, none = {'K1_cm3_per_s': 1.0, 'K2': 0.5}, np.empty(0)
+        patterns = (planar.model_copy(update=even) for planar in self.model.patterns)
+        constants = layout.model_constants(self.model.with_patterns(patterns))
+        constants[:, [RING, CENTRE]] += 1.0
         terms = np.zeros((len(constants), TERMS, len(self._film)))
         for row, of_brush in enumerate(terms):
             on = steps.brush == row
@@ -208,46 +218,34 @@ class FilmIntegrator:
     @property
     def film_um(self) -> np.ndarray:
         """(V,) film [um]."""
-        return after_film_effects(self.raw_um, self._effects, self.points)
+        return after_effects('on_film', self.raw_um, self._effects, self.points)
 
     @property
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
-        return gauge_reading_um(self.film_um, self._effects, self.points)
+        return after_effects('on_gauge', self.film_um, self._effects, self.points)
 
 
-def after_film_effects(
-    raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints
+def after_effects(
+    place: Literal['on_film', 'on_gauge'],
+    film_um: np.ndarray,
+    effects: Iterable[Effect],
+    points: SurfacePoints,
 ) -> np.ndarray:
-    """(V,) film that is there in the end [um] where (V,) arrived [um].
+    """(V,) film that is there in the end, where (V,) arrived, or what a gauge shows on it [um].
 
     Raises:
-        ModelError: an effect gives a film that is not finite.
+        ModelError: an effect gives a film or a reading that is not finite.
     """
     for effect in effects:
-        raw_um = _finite(effect.on_film(raw_um, points), effect, 'film')
-    return raw_um
-
-
-def gauge_reading_um(
-    film_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints
-) -> np.ndarray:
-    """(V,) what a gauge shows [um] on a film (V,) [um].
-
-    Raises:
-        ModelError: an effect gives a reading that is not finite.
-    """
-    for effect in effects:
-        film_um = _finite(effect.on_gauge(film_um, points), effect, 'reading')
+        if effect.is_neutral:
+            continue
+        film_um = getattr(effect, place)(film_um, points)
+        odd = np.flatnonzero(~np.isfinite(film_um))
+        if len(odd):
+            what = 'film' if place == 'on_film' else 'reading'
+            raise ModelError(
+                f'effect {effect.id!r} gives a {what} of {film_um[odd[0]]} µm at {len(odd)} of '
+                f'{len(film_um)} points; correct its law, or take it out of the model'
+            )
     return film_um
-
-
-def _finite(values_um: np.ndarray, effect: Effect, what: str) -> np.ndarray:
-    finite = np.isfinite(values_um)
-    if not finite.all():
-        odd = np.flatnonzero(~finite)
-        raise ModelError(
-            f'effect {effect.id!r} gives a {what} of {values_um[odd[0]]} µm at {len(odd)} of '
-            f'{len(values_um)} points; correct its law, or take it out of the model'
-        )
-    return values_um

@@ -1,23 +1,20 @@
 """What the kernel reads: sub-steps, constants of the model, and which points the gun sees."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.kernel import eq2_flux as kernel
 from paint_deposition.kernel.blocks import LARGEST_BLOCK, THREADS, Blocks
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, Law, within_reach
+from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, within_reach
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
-
-Laws = tuple[tuple[Law, int], ...]
 
 
 def model_constants(model: DepositionModel) -> np.ndarray:
@@ -38,29 +35,6 @@ def model_constants(model: DepositionModel) -> np.ndarray:
         c[kernel.REACH] = model.reach_of_m(planar)
         c[kernel.SHADOW] = model.shadow
     return constants
-
-
-def compiled_laws(effects: Sequence[Effect]) -> tuple[Laws, Laws, np.ndarray]:
-    """What the kernel inlines of effects.
-
-    Flux factors and pattern scales, each with how many parameters it takes; (n,) parameters, one
-    unused number where there are none.
-    """
-    found: list[Laws] = []
-    values: list[float] = []
-    for kind in ('flux_factor', 'pattern_scale'):
-        chosen = [e for e in effects if getattr(type(e), kind) is not None]
-        found.append(tuple((getattr(type(e), kind), len(e.values())) for e in chosen))
-        values += [value for effect in chosen for value in effect.values()]
-    return found[0], found[1], np.array(values or [0.0])
-
-
-def term_constants(model: DepositionModel) -> np.ndarray:
-    """(B, 11) constants with which the film's terms are kept apart, whatever their gains."""
-    even = {'K1_cm3_per_s': 1.0, 'K2': 0.5}
-    c = model_constants(model.with_patterns(p.model_copy(update=even) for p in model.patterns))
-    c[:, [kernel.RING, kernel.CENTRE]] += 1.0
-    return c
 
 
 def term_weights(planar: PlanarPattern) -> tuple[np.ndarray, np.ndarray]:

@@ -84,12 +84,12 @@ class LiveFilm:
     @property
     def counts(self) -> PoseCounts:
         """What became of the poses since the last reset."""
-        return self._builder.counts
+        return self._builder.screen.counts
 
     @property
     def newest_ns(self) -> int | None:
         """Stamp of the newest pose that was kept."""
-        return self._builder.newest_ns
+        return self._builder.screen.newest_ns
 
     @property
     def _settled_ns(self) -> int:
@@ -123,16 +123,13 @@ class LiveFilm:
         passed = bisect_right(self._changes, self._reached_ns, key=_STAMP)
         return self._changes[max(passed - 1, 0) :]
 
-    def reset(self) -> None:
-        """Clear the film; the gun stays on or off if the motion continues."""
-        self.reset_keeping_trigger_of(self)
-
-    def reset_keeping_trigger_of(self, before: 'LiveFilm') -> None:
-        """Clear the film and take over the state of the gun from another film.
+    def reset(self, keeping_trigger_of: 'LiveFilm | None' = None) -> None:
+        """Clear the film; the gun stays on or off as in another film, by default in this one.
 
         Raises:
             ModelError: the model does not have the brush that the gun sprays with.
         """
+        before = keeping_trigger_of or self
         carried, reached_ns = before.carried_over, before._reached_ns
         brushes = {change.brush for change in carried if change.flow > 0.0}
         self.model.require_brushes(brushes)

@@ -119,9 +119,14 @@ class PlanarPattern(BaseModel):
         return self.K1_cm3_per_s * ((1.0 - self.K2) * ring + self.K2 * self.g2(x_m, y_m))
 
     @property
+    @lru_cache(PEAKS_KEPT)  # noqa: B019
     def peak_flux_um_per_s(self) -> float:
         """The strongest film growth of eq. (1) [um/s], good to 1e-4."""
-        return _peak_flux_um_per_s(self)
+        # Along this direction f is largest, but has no value at the very centre; the ring's top
+        # lies between the centre and r.
+        towards = self.phi_rad + 0.5 * math.pi
+        rho = np.linspace(0.0, self.r_m, 129) + 1e-6
+        return float(self.flux_um_per_s(rho * math.cos(towards), rho * math.sin(towards)).max())
 
     def radius_of_flux_m(self, fraction: float) -> float:
         """Radius beyond which the flux stays below ``fraction`` of its peak [m]."""
@@ -129,10 +134,11 @@ class PlanarPattern(BaseModel):
         # g1 stays below twice its outer Gaussian, f below 1 + K3.
         ring = 2.0 * (1.0 - self.K2) * (1.0 + self.K3) / self.gamma_m2
         centre = self.K2 / (2.0 * math.pi * self.sigma2_m**2)
-        return max(
-            self.r_m + self.sigma1_m * _deviations(ring / limit),
-            self.sigma2_m * _deviations(centre / limit),
+        # Within so many standard deviations each Gaussian falls to the limit.
+        of_ring, of_centre = (
+            math.sqrt(2.0 * math.log(max(peak / limit, 1.0))) for peak in (ring, centre)
         )
+        return max(self.r_m + self.sigma1_m * of_ring, self.sigma2_m * of_centre)
 
     def enclosed_fraction(self, radius_m: ArrayLike) -> np.ndarray:
         """Share of the volume within a radius on the model plane [1]; arrays broadcast.
@@ -153,20 +159,6 @@ class PlanarPattern(BaseModel):
         g1 = 2.0 * math.pi * (ring + mirrored) / self.gamma_m2
         g2 = 1.0 - np.exp(-(radius**2) / (2.0 * self.sigma2_m**2))
         return (1.0 - self.K2) * g1 + self.K2 * g2
-
-
-@lru_cache(PEAKS_KEPT)
-def _peak_flux_um_per_s(planar: PlanarPattern) -> float:
-    # Along this direction f is largest, but has no value at the very centre; the ring's top lies
-    # between the centre and r.
-    towards = planar.phi_rad + 0.5 * math.pi
-    rho = np.linspace(0.0, planar.r_m, 129) + 1e-6
-    return float(planar.flux_um_per_s(rho * math.cos(towards), rho * math.sin(towards)).max())
-
-
-def _deviations(ratio: float) -> float:
-    """Standard deviations within which a Gaussian falls by this ratio."""
-    return math.sqrt(2.0 * math.log(max(ratio, 1.0)))
 
 
 # Messages carry the number in 32 bits.

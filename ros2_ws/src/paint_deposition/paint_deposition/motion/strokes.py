@@ -100,21 +100,6 @@ def first_stroke() -> np.ndarray:
 
 
 @njit
-def _advance(state, position):
-    """Follow the path to its next position; length of the heading step that ends here, or 0."""
-    travel = length(difference(position, state.position))
-    state.since_anchor_m += travel
-    state.since_earlier_m += travel
-    step = difference(position, state.anchor)
-    step_m = length(step)
-    for k in range(3):
-        state.position[k] = position[k]
-        if step_m >= HEADING_STEP_M:
-            state.heading[k] = step[k] / step_m
-    return step_m if step_m >= HEADING_STEP_M else 0.0
-
-
-@njit
 def _take_step(state, step_m):
     """Take a heading step into the stroke, or begin the next stroke with it: true if it turns."""
     turns = state.length_m > 0.0 and leaves(state.heading, state.mean, state.carried)
@@ -165,8 +150,18 @@ def follow_strokes(states, position, normal, velocity, dwell, after_gap):
                 state.anchor[k] = state.earlier[k] = state.position[k] = position[i, k]
                 state.heading[k] = state.mean[k] = state.carried[k] = 0.0
         else:
-            step[i] = _advance(state, position[i])
-            if step[i] > 0.0 and _take_step(state, step[i]):
+            travel = length(difference(position[i], state.position))
+            state.since_anchor_m += travel
+            state.since_earlier_m += travel
+            way = difference(position[i], state.anchor)
+            way_m = length(way)
+            is_step = way_m >= HEADING_STEP_M
+            for k in range(3):
+                state.position[k] = position[i, k]
+                if is_step:
+                    state.heading[k] = way[k] / way_m
+            step[i] = way_m if is_step else 0.0
+            if is_step and _take_step(state, way_m):
                 state.from_turn_m -= half_step
         stroke[i], from_turn[i] = state.number, state.from_turn_m + half_step
         state.from_turn_m += 2.0 * half_step
@@ -230,8 +225,15 @@ def _end(state):
 @njit
 def _spray(state, heading):
     """Begin a pass here, where the gun is open, if none runs and this is no link."""
-    if state.state == RUNS and state.flow == 0.0 and _on_another_track(state):
-        _end(state)
+    if state.state == RUNS and state.flow == 0.0:
+        # The way from where it closed, seen along the tool axis.
+        x, y, z = difference(state.position, state.closed_at)
+        off = dot((x, y, z), state.normal)
+        way = x - off * state.normal[0], y - off * state.normal[1], z - off * state.normal[2]
+        # A gun that opens more than 30 degrees off the line on which it closed is on another
+        # track.
+        if dot(way, way) >= HEADING_STEP_M**2 and cosine(way, state.carried) < math.sqrt(0.75):
+            _end(state)
     if state.state == RUNS:
         return
     if dot(heading, heading) == 0.0:
@@ -244,18 +246,6 @@ def _spray(state, heading):
         state.state = RUNS
         state.length_m = 0.0
         take_in(heading, 1.0, 1.0, state.mean, state.carried)
-
-
-@njit
-def _on_another_track(state):
-    """Whether the gun has left the line on which it closed, seen along the tool axis."""
-    x, y, z = difference(state.position, state.closed_at)
-    off = dot((x, y, z), state.normal)
-    between = x - off * state.normal[0], y - off * state.normal[1], z - off * state.normal[2]
-    if dot(between, between) < HEADING_STEP_M**2:
-        return False
-    # A gun that opens more than 30 degrees off the line on which it closed is on another track.
-    return cosine(between, state.carried) < math.sqrt(0.75)
 
 
 @njit(cache=True)

@@ -8,7 +8,6 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from itertools import pairwise
 from operator import itemgetter, matmul
 from typing import Any
 
@@ -315,10 +314,6 @@ class FrameTree:
         if not np.array_equal(before[3:], after[3:]):
             pose[3:] = quaternion_slerp(before[3:], after[3:], share, shortest_path=True)
         return Rigid.of(pose)
-
-    def longest_gap_s(self, child: str) -> float:
-        """Between two poses of a frame over time."""
-        return 1e-9 * max((b - a for a, b in pairwise(self.stamps_ns(child))), default=0)
 
 
 def _name(frame: str) -> str:

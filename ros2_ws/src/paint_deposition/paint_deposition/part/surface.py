@@ -268,23 +268,9 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
     for positions_m, z_axes in motions:
         front, back, axes = facing(surface, positions_m, z_axes)
         if len(axes):
-            return _settled(surface, front, back, axes)
-    return surface
-
-
-def turned(surface: Surface) -> Surface:
-    """The part with its other side outward."""
-    edges = surface.curved_edges
-    return replace(
-        surface,
-        faces=np.ascontiguousarray(surface.faces[:, ::-1]),
-        normals=-surface.normals,
-        curved_edges=replace(edges, normals=-edges.normals, curved_normals=-edges.curved_normals),
-    )
-
-
-def _settled(surface: Surface, front: int, back: int, axes: np.ndarray) -> Surface:
-    """The part with the side outward that these poses look at."""
+            break
+    else:
+        return surface
     if back > front:
         note = (
             f'{back} of {back + front} poses look at the back of the mesh: its '
@@ -303,6 +289,17 @@ def _settled(surface: Surface, front: int, back: int, axes: np.ndarray) -> Surfa
     vars(known).update({key: value for key, value in made if key in ('_tree', 'occluder')})
     settled = surface.gun_side is not None and np.array_equal(known.outward, surface.outward)
     return surface if settled else known
+
+
+def turned(surface: Surface) -> Surface:
+    """The part with its other side outward."""
+    edges = surface.curved_edges
+    return replace(
+        surface,
+        faces=np.ascontiguousarray(surface.faces[:, ::-1]),
+        normals=-surface.normals,
+        curved_edges=replace(edges, normals=-edges.normals, curved_normals=-edges.curved_normals),
+    )
 
 
 def facing(

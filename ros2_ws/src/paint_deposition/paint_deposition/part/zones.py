@@ -122,7 +122,7 @@ class Zones:
                     f"zone '{zone.name}': all {inside.sum()} vertices of the part in it belong to "
                     f'zones before it ({names}); put it before them'
                 )
-            places_m = [zone.box_m, zone.patch and zone.patch.box_m]
+            places_m = [zone.box_m, zone.patch.box_m if zone.patch else None]
             boxes = ' and '.join(box_words(corners) for corners in places_m if corners is not None)
             raise PaintError(
                 f"zone '{zone.name}' holds no vertex of the part: it lies within {boxes}, the "

@@ -227,7 +227,7 @@ class PaintingNode(ManagedNode, ABC):
             film = self._unpainted(part.surface, part.points, self.models)
         for new, old in zip(film.guns, self.film.guns, strict=True):
             new.trigger_latency_s = self.values['trigger_latency_s']
-            new.reset_keeping_trigger_of(old)
+            new.reset(keeping_trigger_of=old)
         for source in self.inputs:
             source.reset_counts()
         self.mesh_file, self.files_in_use = mesh_file, self._files
