@@ -6,6 +6,7 @@ come in. The film is the same to the last bit.
 
 import copy
 from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -16,7 +17,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
 from paint_deposition.film import layout
 from paint_deposition.film.statistics import PaintUsed
-from paint_deposition.kernel.blocks import LARGEST_BLOCK, shared_among_threads
+from paint_deposition.kernel.blocks import LARGEST_BLOCK, THREADS, shared_among_threads
 from paint_deposition.kernel.eq2_flux import CENTRE, REACH, RING, TERMS, Law, compile_kernel
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
@@ -37,10 +38,10 @@ class Steps:
 
     rows: np.ndarray  # (M, 16) sub-steps that spray, see ``layout.step_rows``
     brush: np.ndarray  # (M,) row among the model's patterns of the one that sprays
-    # What is seen on them, see ``layout.Sight``.
+    # (N,) uint8, 1 where a point is seen, a run of points for each of S tracings and each block.
     seen: np.ndarray
-    first: np.ndarray
-    tracing: np.ndarray
+    first: np.ndarray  # (S, B) where the run of a tracing and a block begins
+    tracing: np.ndarray  # (M,) which tracing holds
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -70,7 +71,8 @@ class FilmIntegrator:
         self._parallel = parallel
         self._real: Any = np.float32 if precision == 'single' else np.float64
         self._occluder = occluder
-        self._lines_of_sight: layout.LinesOfSight | None = None
+        # Of the sorted points; where nothing stands higher over a point it is seen.
+        self._horizon: np.ndarray | None = None
         self._keep_absent_laws = keep_absent_laws
         self._blocks = points.blocks(self._real)
         self.reset()
@@ -83,8 +85,13 @@ class FilmIntegrator:
             model.projection, self.points.down, self.points.outward, self.points.centre_m
         )
         self._shadowed = model.shadow > 0.0 and self._occluder is not None
-        if self._occluder is not None and self._shadowed and self._lines_of_sight is None:
-            self._lines_of_sight = layout.LinesOfSight(self._occluder, self.points, self._blocks)
+        if self._occluder is not None and self._shadowed and self._horizon is None:
+            order = self._blocks.order
+            self._positions_m, self._normals = (
+                self.points.positions_m[order],
+                self.points.normals[order],
+            )
+            self._horizon = self._occluder.horizon_sines(self._positions_m, self._normals)
         # Absent effects are left out rather than computed: they change nothing, to the bit.
         self._effects = [effect for effect in model.effects if not effect.is_neutral]
         compiled = model.effects if self._keep_absent_laws else self._effects
@@ -173,18 +180,60 @@ class FilmIntegrator:
         """What the kernel reads; ``reach`` of lines of sight, if it is not the pattern's."""
         rows = layout.step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
         brush = self.model.pattern_rows(path.brush)
-        if not (self._lines_of_sight and self._shadowed):
+        if self._occluder is None or not self._shadowed:
             run = np.ones(LARGEST_BLOCK, dtype=np.uint8)  # everything is seen
             first = np.zeros((1, len(self._blocks.spheres)), np.int64)
             return Steps(rows, brush, run, first, np.zeros(len(rows), np.int64))
         constants = layout.model_constants(self.model)
         if reach is not None:
             constants[:, REACH] = reach
-        sight, self._traced_from = self._lines_of_sight.along(
-            layout.emission_points_m(self.model, path), rows, brush,
-            constants.astype(self._real), self._traced_from,
-        )  # fmt: skip
-        return Steps(rows, brush, *sight)
+        origins_m = layout.emission_points_m(self.model, path)
+        constants = constants.astype(self._real)
+        return self._traced(self._occluder.sees, origins_m, rows, brush, constants)
+
+    def _traced(
+        self, sees: Callable[[np.ndarray, np.ndarray], np.ndarray], origins_m: np.ndarray,
+        rows: np.ndarray, brush: np.ndarray, constants: np.ndarray,
+    ) -> Steps:  # fmt: skip
+        """Trace rays from the first origin (M, 3) and then after every SIGHT_STEP_M of travel.
+
+        A point whose normal looks away needs no ray, nor does one over which the gun stands higher
+        than all of the part, nor any of a block that lies out of the reach in ``constants``.
+        """
+        # (S, 3) origins from which to trace, and (M,) the row of them that holds.
+        places_m = [] if self._traced_from is None else [self._traced_from]
+        tracing = np.empty(len(origins_m), dtype=np.int64)
+        for step, origin in enumerate(origins_m):
+            if not places_m or np.linalg.norm(origin - places_m[-1]) > layout.SIGHT_STEP_M:
+                places_m.append(origin)
+            tracing[step] = len(places_m) - 1
+        traced, blocks = np.reshape(places_m, (-1, 3)), self._blocks
+        lit = layout.reached_blocks(blocks.spheres, rows, tracing, brush, constants, len(traced))
+        which, block = np.nonzero(lit)
+        sizes = np.diff(blocks.bounds)[block]
+        # The first run is that of whatever lies out of reach.
+        starts = LARGEST_BLOCK + np.cumsum(sizes) - sizes
+        first = np.zeros(lit.shape, dtype=np.int64)
+        first[which, block] = starts
+        seen = np.ones(LARGEST_BLOCK + sizes.sum(), dtype=np.uint8)
+        begins = np.searchsorted(tracing, np.arange(len(traced) + 1))
+
+        def trace(start: int, stop: int) -> None:
+            some = slice(start, stop)
+            places, tracings, points = layout.rays_to_trace(
+                blocks.bounds, blocks.points, blocks.normals, self._positions_m, self._normals,
+                self._horizon, traced, rows, begins, brush, constants,
+                which[some], block[some], starts[some],
+            )  # fmt: skip
+            seen[places] = sees(traced[tracings], self._positions_m[points])
+
+        # RAYS_AT_ONCE or a little more in each.
+        parts = np.cumsum(sizes) // layout.RAYS_AT_ONCE
+        cuts = np.flatnonzero(np.diff(parts, prepend=-1))
+        with ThreadPoolExecutor(THREADS) as threads:
+            list(threads.map(trace, cuts, [*cuts[1:], len(sizes)]))
+        self._traced_from = traced[-1] if len(traced) else None
+        return Steps(rows, brush, seen, first, tracing)
 
     def _run(
         self, separate_terms: bool, steps: Steps, constants: np.ndarray,

@@ -182,8 +182,7 @@ class PathBuilder:
         """The path with its strokes and passes, and what lies behind each sub-step."""
         if self._states is None:
             flow_before = 0.0 if self._flow else 1.0
-            of_pass = strokes.first_pass(flow_before)
-            self._states = strokes.first_stroke(), of_pass, first_trigger(flow_before)
+            self._states = *strokes.first_states(flow_before), first_trigger(flow_before)
             after_gap[0] = False  # Nothing came before the first.
         of_stroke, of_pass, of_trigger = self._states
         position, normal = path.position_m, path.rotation[:, :, 2]

@@ -87,16 +87,20 @@ def take_in(heading, step_m, length_m, mean, carried):
         carried[k] += gain * (heading[k] - carried[k])
 
 
-def first_stroke() -> np.ndarray:
-    """State before the first sub-step: (1,) record."""
+def first_states(flow_before: float) -> tuple[np.ndarray, np.ndarray]:
+    """(1,) states of stroke and pass before the first sub-step, from the flow until then."""
     # anchor and earlier are where the last two heading steps began, with the path since then: a
     # turn that shows now lies behind the earlier one.
     lengths = ('from_turn_m', 'length_m', 'since_anchor_m', 'since_earlier_m')
     vectors = ('position', 'normal', 'anchor', 'earlier', 'heading', 'mean', 'carried')
     fields = [('number', 'i8'), *((name, 'f8') for name in lengths)]
-    state = np.zeros(1, np.dtype([*fields, *((name, 'f8', 3) for name in vectors)]))
-    state['number'] = -1
-    return state
+    of_stroke = np.zeros(1, np.dtype([*fields, *((name, 'f8', 3) for name in vectors)]))
+    places = ('position', 'normal', 'mean', 'carried', 'closed_at')
+    fields = [('number', 'i8'), ('state', 'i8'), ('length_m', 'f8'), ('flow', 'f8')]
+    of_pass = np.zeros(1, np.dtype([*fields, *((name, 'f8', 3) for name in places)]))
+    of_stroke['number'] = of_pass['number'] = -1
+    of_pass['flow'] = flow_before
+    return of_stroke, of_pass
 
 
 @njit
@@ -201,16 +205,6 @@ def look_ahead(stroke, velocity, dwell, flow, since_on, from_turn):
 
 
 AWAITED, RUNS, ENDED = 0, 1, 2
-
-
-def first_pass(flow_before: float) -> np.ndarray:
-    """State before the first sub-step: (1,) record, from the flow that was on until then."""
-    vectors = ('position', 'normal', 'mean', 'carried', 'closed_at')
-    numbers = [('number', 'i8'), ('state', 'i8'), ('length_m', 'f8'), ('flow', 'f8')]
-    state = np.zeros(1, np.dtype([*numbers, *((name, 'f8', 3) for name in vectors)]))
-    state['number'] = -1
-    state['flow'] = flow_before
-    return state
 
 
 @njit

@@ -86,9 +86,8 @@ def refine(
             pieces = _cut_slivers(faces[thin], of_face[thin], length_m, parts, first)
             faces = np.concatenate([np.delete(faces, thin, axis=0), pieces])
             continue
-        longest = _longest(length_m, of_face)
         halved = too_long | (known >= 0)
-        _close_under_longest(halved, of_face, longest)
+        longest = _close_under_longest(halved, length_m, of_face)
         middle = mesh.add_middles(edges, halved, known)
         faces = _split(mesh.vertices_m, faces, middle[of_face], longest)
 
@@ -228,8 +227,12 @@ def _ladder(left_parts: int, right_parts: int) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True)
-def _longest(length_m, of_face):
-    """(F,) 0 to 2, the longest edge; of equal ones that of higher number: neighbours agree."""
+def _close_under_longest(halved, length_m, of_face):
+    """Add to the (E,) edges to halve the longest of every triangle that is touched.
+
+    Returned is (F,) 0 to 2, the longest edge; of equal ones that of higher number: neighbours
+    agree.
+    """
     longest = np.zeros(len(of_face), dtype=np.int64)
     for f in range(len(of_face)):
         for k in (1, 2):
@@ -237,12 +240,6 @@ def _longest(length_m, of_face):
             longer = length_m[other] > length_m[best]
             if longer or (length_m[other] == length_m[best] and other > best):
                 longest[f] = k
-    return longest
-
-
-@njit(cache=True, nogil=True)
-def _close_under_longest(halved, of_face, longest):
-    """Add to the (E,) edges to halve the longest of every triangle that is touched."""
     changed = True
     while changed:
         changed = False
@@ -252,6 +249,7 @@ def _close_under_longest(halved, of_face, longest):
                 halved[of_face[f, 0]] or halved[of_face[f, 1]] or halved[of_face[f, 2]]
             ):
                 halved[own] = changed = True
+    return longest
 
 
 def _split(
