@@ -185,7 +185,7 @@ def test_repeated_poses_leave_the_speed_of_the_gun_and_the_same_path_live():
     for part in np.array_split(np.arange(len(rows)), 60):
         live.add_poses(STAMPS[part], POSITIONS[rows[part]], QUATERNIONS[rows[part]])
     again = live.take(finish=True)
-    assert live.counts == counts
+    assert live.screen.counts == counts
     assert np.array_equal(again.position_m, path.position_m)
 
 

@@ -193,11 +193,6 @@ class LiveFilms:
         """Stamp of the newest pose of any gun that was kept."""
         return max((gun.newest_ns for gun in self.guns if gun.newest_ns is not None), default=None)
 
-    @property
-    def complete(self) -> bool:
-        """Whether all motion so far is remembered and can be painted again."""
-        return all(gun.log.complete for gun in self.guns)
-
     def snapshot(self) -> CommonFilm:
         """The film of everything received so far; equal to the last one if nothing was."""
         return CommonFilm(tuple(gun.snapshot() for gun in self.guns))

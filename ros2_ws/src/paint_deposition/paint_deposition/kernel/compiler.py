@@ -39,45 +39,49 @@ def kinds_at_hand() -> list[str]:
     return [kind for kind, (needs, _) in KINDS.items() if all(map(has.get, needs.split()))]
 
 
-def compiler_for(kind: str) -> Callable[..., Any]:
-    """Numba's ``njit`` for a kind of processor; call it once for each."""
-    if config.CPU_FEATURES is not None:
-        features = config.CPU_FEATURES
-    else:
-        features = KINDS[kind][1] if kind in KINDS else get_host_cpu_features()
-    name = f'paint-{kind}'
-
-    class Code(JITCPUCodegen):
-        def _get_host_cpu_name(self) -> str:
-            return kind
-
-        def _get_host_cpu_features(self) -> str:
-            return features
-
-    class Descriptor(CPUTarget):
-        @cached_property
-        def _toplevel_target_context(self) -> CPUContext:
-            context = CPUContext(self.typing_context, self._target_name)
-            context._internal_codegen = Code(name)
-            return context
-
-    class Dispatcher(CPUDispatcher):
-        targetdescr = Descriptor(name)
-
-    def njit(*functions: Callable[..., Any], nopython: bool = True, **options: Any) -> Any:
-        return numba.jit(*functions, nopython=nopython, _target=name, **options)
-
-    # What Numba's own functions and the overloads of `fast_math` are compiled by within ours.
-    target = type(name, (CPU,), {})
-    target_registry[name] = target
-    dispatcher_registry[target] = Dispatcher
-    jit_registry[target] = njit
-    return njit
-
-
 KIND = config.CPU_NAME or next(iter(kinds_at_hand()), llvm.get_host_cpu_name())
-njit = compiler_for(KIND)
+FEATURES = config.CPU_FEATURES
+if FEATURES is None:
+    FEATURES = KINDS[KIND][1] if KIND in KINDS else get_host_cpu_features()
+TARGET_NAME = f'paint-{KIND}'
 
+
+class Code(JITCPUCodegen):
+    """Numba's code generator for the kind of processor."""
+
+    def _get_host_cpu_name(self) -> str:
+        return KIND
+
+    def _get_host_cpu_features(self) -> str:
+        return FEATURES
+
+
+class Descriptor(CPUTarget):
+    """Numba's description of the target, with our code generator."""
+
+    @cached_property
+    def _toplevel_target_context(self) -> CPUContext:
+        context = CPUContext(self.typing_context, self._target_name)
+        context._internal_codegen = Code(TARGET_NAME)
+        return context
+
+
+class Dispatcher(CPUDispatcher):
+    """Functions that are compiled for the target."""
+
+    targetdescr = Descriptor(TARGET_NAME)
+
+
+def njit(*functions: Callable[..., Any], nopython: bool = True, **options: Any) -> Any:
+    """Numba's ``njit`` for the kind of processor."""
+    return numba.jit(*functions, nopython=nopython, _target=TARGET_NAME, **options)
+
+
+# What Numba's own functions and the overloads of `fast_math` are compiled by within ours.
+target = type(TARGET_NAME, (CPU,), {})
+target_registry[TARGET_NAME] = target
+dispatcher_registry[target] = Dispatcher
+jit_registry[target] = njit
 
 Compiled = TypeVar('Compiled', bound=Callable[..., Any])
 

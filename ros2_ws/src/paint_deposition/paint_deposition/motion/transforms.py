@@ -256,13 +256,6 @@ class FrameTree:
             return None
         return {*up, *down} & self._moving.keys() - self._still.keys()
 
-    def connected(self, frame: str) -> list[str]:
-        """The other frames that a frame is connected with by fixed ones."""
-        return [
-            name for name in self.names
-            if name != _name(frame) and self.moving_between(frame, name) == set()
-        ]  # fmt: skip
-
     def lookup(self, source: str, target: str, stamp_ns: int = 0) -> Rigid:
         """The pose of frame `source` in `target` at that time, which brings poses from one to
         the other.

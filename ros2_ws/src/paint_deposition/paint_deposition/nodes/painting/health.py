@@ -156,7 +156,7 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
     }
     if node.model_problem:
         return Status(WARN, node.model_problem, values)
-    if not node.film.complete:
+    if not all(gun.log.complete for gun in guns):
         limit = f'over {node.values["pose_memory"]} poses (pose_memory)'
         return Status(WARN, f'{limit}: a new model paints from then on only', values)
     if factor > 0.8:
