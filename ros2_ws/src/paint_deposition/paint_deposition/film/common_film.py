@@ -202,11 +202,6 @@ class LiveFilms:
         for gun in self.guns if self.counts.received else ():
             gun.reset()
 
-    def warm_up(self) -> None:
-        """Compile the models and compute all they need, before there is any motion."""
-        for gun in self.guns:
-            gun.warm_up()
-
 
 def require_same_film_effects(
     models: Mapping[str, DepositionModel], places: Sequence[str] = ('on_film', 'on_gauge')

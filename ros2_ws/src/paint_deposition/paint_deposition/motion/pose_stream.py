@@ -220,11 +220,10 @@ class PoseScreen:
         self._behind = poses.select(behind)
         return [poses.select(rows) for rows in streams]
 
-    def finish(self) -> int:
-        """The stream has ended: what still waits is dropped; the number of these poses."""
-        dropped, self._behind = len(self._behind), NO_POSES
-        self.counts.backward_stamps += dropped
-        return dropped
+    def finish(self) -> None:
+        """The stream has ended: what still waits is dropped."""
+        self.counts.backward_stamps += len(self._behind)
+        self._behind = NO_POSES
 
     def _rotations(self, poses: PoseBatch) -> PoseBatch:
         quaternions = poses.quaternions_xyzw

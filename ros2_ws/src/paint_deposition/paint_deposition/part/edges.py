@@ -92,17 +92,13 @@ def half_edges_m(vertices_m: np.ndarray, faces: np.ndarray, half_edges: np.ndarr
     return vertices_m[np.stack([corners[half_edges], corners[next_half_edge(half_edges)]], axis=1)]
 
 
-def connected(rows: np.ndarray, count: int) -> tuple[int, np.ndarray]:
+@njit(cache=True, nogil=True)
+def connected(rows, count):
     """How many groups of ``count`` members rows (P, K) make, and (count,) the group of each.
 
     Members in one row, the ends of an edge or the corners of a face, are of one group. Groups are
     numbered in the order of their first members.
     """
-    return _connected(np.ascontiguousarray(rows, dtype=np.int64), count)
-
-
-@njit(cache=True, nogil=True)
-def _connected(rows, count):
     # Members hang from the first of all that they are joined to.
     parents = np.arange(count).astype(np.int32)
     for row in rows:

@@ -57,7 +57,8 @@ class Repainting:
     def _run(self) -> None:
         try:
             films = self._make()
-            films.warm_up()
+            for film in films.guns:
+                film.warm_up()
             repainted = zip(films.guns, self._logs, strict=True) if self._from_start else ()
             for film, log in repainted:
                 # The rest is for the thread of the executor, which must not be blocked.
@@ -173,7 +174,8 @@ class PaintingNode(ManagedNode, ABC):
         if values.get('zones_file'):
             zones = read_zones(values['zones_file'], mesh_file, values['mesh_scale']).on(surface)
         film = self._unpainted(surface, points, self.models)
-        film.warm_up()
+        for gun in film.guns:
+            gun.warm_up()
         facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # builds the tree for a gun's rays
         return PreparedPart(surface, points, film, zones)
 
