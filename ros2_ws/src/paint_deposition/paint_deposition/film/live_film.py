@@ -183,7 +183,7 @@ class LiveFilm:
             return
         self.log.add(batch)
         before_ns = self.newest_ns
-        self._builder.add_poses(batch.stamps_ns, batch.positions_m, batch.quaternions_xyzw)
+        self._builder.add_poses(batch)
         if self.newest_ns is not None and self.newest_ns != before_ns:
             self._reached_ns = self.newest_ns
         self._integrator.add(self._builder.take(self._settled_ns))
@@ -223,7 +223,7 @@ class LiveFilm:
         """Compile the model and compute all it needs, before there is any motion."""
         far_away = np.full((2, 3), 1e3)
         builder = PathBuilder()
-        builder.add_poses([0, 1_000_000], far_away, np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
+        builder.add_poses(PoseBatch.of([0, 1_000_000], far_away, np.eye(4)[[3, 3]]))
         unpainted = self._integrator.fork()
         path = builder.take(finish=True)
         unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))

@@ -9,7 +9,6 @@ from itertools import pairwise
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion import strokes
@@ -83,11 +82,8 @@ class PathBuilder:
             self.screen.counts.late_triggers += int(stamp_ns) < self._integrated_ns
         self._flow.add(stamp_ns, flow, brush, another_stream=waits)
 
-    def add_poses(
-        self, stamps_ns: ArrayLike, positions_m: ArrayLike, quaternions_xyzw: ArrayLike
-    ) -> None:
-        """Take poses: (N,) int64, (N, 3) [m], (N, 4) scalar last."""
-        batch = PoseBatch.of(stamps_ns, positions_m, quaternions_xyzw)
+    def add_poses(self, batch: PoseBatch) -> None:
+        """Take poses."""
         continued, *restarted = self.screen.take(batch)
         self._waiting.append(continued)
         if self._stream_ns is None and len(continued):
@@ -218,7 +214,7 @@ def spray_path(
         if isinstance(event, TriggerChange):
             builder.add_trigger(event.stamp_ns, event.flow, event.brush)
         else:
-            builder.add_poses(*vars(event).values())
+            builder.add_poses(event)
     return builder.take(finish=True), builder.screen.counts
 
 
