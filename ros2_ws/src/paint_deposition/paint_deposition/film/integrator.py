@@ -43,9 +43,6 @@ class Steps:
     first: np.ndarray  # (S, B) where the run of a tracing and a block begins
     tracing: np.ndarray  # (M,) which tracing holds
 
-    def __len__(self) -> int:
-        return len(self.rows)
-
 
 class FilmIntegrator:
     """Accumulates the film of a model on surface points as the path comes in.
@@ -147,7 +144,7 @@ class FilmIntegrator:
         """Paint along a path that was prepared for the effects and projection of the model."""
         constants = layout.model_constants(self.model)
         self._run(False, steps, constants, self._film, self._recent, np.empty((TERMS, 0)))
-        self._done += len(steps)
+        self._done += len(steps.rows)
 
     def terms(self, steps: Steps) -> np.ndarray:
         """(7 B, V) what the film of these sub-steps alone is made of, by brush.
@@ -246,7 +243,7 @@ class FilmIntegrator:
             constants.astype(self._real), self._parameters,
         )  # fmt: skip
         kernel = compile_kernel(*self._variant, separate_terms)
-        many = self._parallel and len(steps) * len(self._film) >= FEW_RAYS
+        many = self._parallel and len(steps.rows) * len(self._film) >= FEW_RAYS
         count = len(blocks.spheres)
         shared_among_threads(
             count, lambda first, last: kernel(first, last, *arguments), 1 if many else count
