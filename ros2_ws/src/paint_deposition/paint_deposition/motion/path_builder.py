@@ -177,7 +177,7 @@ class PathBuilder:
     def _with_strokes_and_passes(self, path: SprayPath, after_gap: np.ndarray) -> SprayPath:
         """The path with its strokes and passes, and what lies behind each sub-step."""
         if self._states is None:
-            flow_before = 0.0 if self._flow else 1.0
+            flow_before = float(self._flow.steps()[1][0])
             self._states = *strokes.first_states(flow_before), first_trigger(flow_before)
             after_gap[0] = False  # Nothing came before the first.
         of_stroke, of_pass, of_trigger = self._states

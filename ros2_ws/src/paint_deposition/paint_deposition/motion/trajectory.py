@@ -90,9 +90,6 @@ class FlowSchedule:
         self._changes: list[tuple[int, float, int]] = []
         self._of_another_stream: list[tuple[int, float, int]] = []
 
-    def __bool__(self) -> bool:
-        return bool(self._changes)
-
     def add(
         self, stamp_ns: int, flow: float, brush: int = ONLY_BRUSH, another_stream: bool = False
     ) -> None:

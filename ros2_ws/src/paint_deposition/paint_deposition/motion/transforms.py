@@ -146,6 +146,8 @@ class FrameTree:
         # Parent and pose of a frame that does not move; of these, where the user says that it is.
         self._fixed: dict[str, tuple[str, Rigid]] = {}
         self._placed: dict[str, tuple[str, Rigid]] = {}
+        # Both, the user's in the place of the others.
+        self._still: dict[str, tuple[str, Rigid]] = {}
         # Stamp, parent and pose of each frame over time, in order; and of a live one that the
         # last transform was far behind.
         self._moving: dict[str, list[tuple[int, str, np.ndarray]]] = {}
@@ -165,6 +167,7 @@ class FrameTree:
         if self._has_room(child):
             self._lasting.clear()
             self._fixed[_name(child)] = _name(parent), Rigid.of(pose)
+            self._still = self._fixed | self._placed
 
     def place(self, child: str, parent: str, pose: Sequence[float]) -> None:
         """Say where a frame is, whatever transforms say of it; no pose: they say it again."""
@@ -172,6 +175,7 @@ class FrameTree:
         self._placed.pop(_name(child), None)
         if len(pose):
             self._placed[_name(child)] = _name(parent), Rigid.of(pose)
+        self._still = self._fixed | self._placed
 
     def add(self, child: str, parent: str, stamp_ns: int, pose: Sequence[float]) -> bool:
         """Take a transform at one time.
@@ -211,10 +215,6 @@ class FrameTree:
     def placed(self, child: str) -> tuple[str, Rigid] | None:
         """Parent and pose of a frame that does not move, None if it does or is not known."""
         return self._still.get(_name(child))
-
-    @property
-    def _still(self) -> dict[str, tuple[str, Rigid]]:
-        return self._fixed | self._placed
 
     def newest_ns(self, child: str) -> int:
         """Stamp of the newest pose of a frame over time, 0 without any."""
