@@ -21,8 +21,6 @@ from paint_deposition.motion.trajectory import (
     FlowSchedule,
     PoseCounts,
     Trajectory,
-    first_trigger,
-    follow_trigger,
     gap_ns,
 )
 
@@ -178,7 +176,7 @@ class PathBuilder:
         """The path with its strokes and passes, and what lies behind each sub-step."""
         if self._states is None:
             flow_before = float(self._flow.steps()[1][0])
-            self._states = *strokes.first_states(flow_before), first_trigger(flow_before)
+            self._states = strokes.first_states(flow_before)
             after_gap[0] = False  # Nothing came before the first.
         of_stroke, of_pass, of_trigger = self._states
         position, normal = path.position_m, path.rotation[:, :, 2]
@@ -188,7 +186,7 @@ class PathBuilder:
         spray_pass = strokes.follow_passes(
             of_pass, position, normal, heading, step, path.flow, after_gap
         )
-        open_flow, open_brush, since_on, since_off = follow_trigger(
+        open_flow, open_brush, since_on, since_off = strokes.follow_trigger(
             of_trigger, path.dwell_s, path.flow, path.brush, after_gap
         )
         if self._began_ns is None:

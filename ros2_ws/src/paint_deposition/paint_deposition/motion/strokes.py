@@ -1,4 +1,4 @@
-"""Strokes and passes, numbered over the sub-steps of a path.
+"""Strokes and passes, numbered over the sub-steps of a path, and the time since the gun switched.
 
 Strokes are the straight or gently curved stretches between the turns of the tool path.
 
@@ -43,6 +43,7 @@ import numpy as np
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.fast_math import cross, difference, dot, length
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 # The path's heading is judged over this travel, so that jitter at rest is no turn [m].
 HEADING_STEP_M = 0.01
@@ -87,8 +88,8 @@ def take_in(heading, step_m, length_m, mean, carried):
         carried[k] += gain * (heading[k] - carried[k])
 
 
-def first_states(flow_before: float) -> tuple[np.ndarray, np.ndarray]:
-    """(1,) states of stroke and pass before the first sub-step, from the flow until then."""
+def first_states(flow_before: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(1,) states of stroke, pass and trigger before the first sub-step, by the flow before."""
     # anchor and earlier are where the last two heading steps began, with the path since then: a
     # turn that shows now lies behind the earlier one.
     lengths = ('from_turn_m', 'length_m', 'since_anchor_m', 'since_earlier_m')
@@ -100,7 +101,10 @@ def first_states(flow_before: float) -> tuple[np.ndarray, np.ndarray]:
     of_pass = np.zeros(1, np.dtype([*fields, *((name, 'f8', 3) for name in places)]))
     of_stroke['number'] = of_pass['number'] = -1
     of_pass['flow'] = flow_before
-    return of_stroke, of_pass
+    numbers = ('flow', 'open_flow', 'dwell_s', 'since_on_s', 'since_off_s')
+    fields = [*((name, 'f8') for name in numbers), ('open_brush', 'i8')]
+    first = flow_before, 1.0, 0.0, np.inf, np.inf, ONLY_BRUSH
+    return of_stroke, of_pass, np.array([first], np.dtype(fields))
 
 
 @njit
@@ -273,3 +277,37 @@ def follow_passes(states, position, normal, heading, step, flow, after_gap):
             _spray(state, heading[i])
         spray_pass[i], state.flow = state.number, flow[i]
     return spray_pass
+
+
+@njit(cache=True)
+def follow_trigger(states, dwell, flow, brush, after_gap):
+    """Measure back to the last opening and closing of the gun; a gap forgets them.
+
+    ``states`` (1,) is updated in place; all others (M,): dwell [s], relative flow, 0 gun off,
+    int64 brush, which counts where the gun is on, and after_gap.
+
+    Returns:
+        open_flow and open_brush (M,) of the opening that runs or ran last; since_on_s and
+        since_off_s (M,) to the middle of the sub-step, inf where there is nothing to measure to.
+    """
+    count = len(dwell)
+    open_flow, since_on, since_off = np.empty(count), np.empty(count), np.empty(count)
+    open_brush = np.empty(count, np.int64)
+    state = states[0]
+    for i in range(count):
+        if after_gap[i]:
+            state.flow = 0.0
+            state.since_on_s = state.since_off_s = np.inf
+        elapsed = 0.5 * (state.dwell_s + dwell[i])
+        state.since_on_s += elapsed
+        state.since_off_s += elapsed
+        if flow[i] > 0.0 and state.flow == 0.0:
+            state.since_on_s = 0.5 * dwell[i]
+        if flow[i] == 0.0 and state.flow > 0.0:
+            state.since_off_s = 0.5 * dwell[i]
+        if flow[i] > 0.0:
+            state.open_flow, state.open_brush = flow[i], brush[i]
+        state.flow, state.dwell_s = flow[i], dwell[i]
+        open_flow[i], open_brush[i] = state.open_flow, state.open_brush
+        since_on[i], since_off[i] = state.since_on_s, state.since_off_s
+    return open_flow, open_brush, since_on, since_off
