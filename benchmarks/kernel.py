@@ -68,7 +68,7 @@ class Case:
             tool = self.path.rotation[row]
             emission = self.path.position_m[row] - offset * tool[:, 2]
             x, y, z = ((self.points.positions_m - emission) @ tool).T
-            inside = (z > offset) & (np.hypot(x, y) * omega < MODEL.reach_m * z)
+            inside = (z > offset) & (np.hypot(x, y) * omega < MODEL.reach_of_m(MODEL.planar) * z)
             shares.append(inside.mean())
         return float(np.mean(shares))
 
@@ -241,12 +241,13 @@ import numpy as np
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.motion.path_builder import PathBuilder
+from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.part.points import SurfacePoints
 from reference import reference_film_um
 loaded = time.perf_counter()
 points = SurfacePoints(np.zeros((64, 3)), np.tile([0.0, 0.0, 1.0], (64, 1)))
 builder = PathBuilder()
-builder.add_poses([0, 10_000_000], np.full((2, 3), 0.3), np.tile([1.0, 0, 0, 0], (2, 1)))
+builder.add_poses(PoseBatch.of([0, 10_000_000], np.full((2, 3), 0.3), np.eye(4)[[0, 0]]))
 film = FilmIntegrator(points, DepositionModel())
 film.add(builder.take(finish=True))
 print(loaded - begin, time.perf_counter() - loaded)

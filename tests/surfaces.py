@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import Delaunay
 
-from paint_deposition.part.edges import Edges
+from paint_deposition.part.edges import matched_half_edges
 from paint_deposition.part.surface import Surface
 
 Depth = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -90,7 +90,7 @@ def solid(
     outward = trimesh.Trimesh(vertices_m, faces, process=False).vertex_normals
     inner = vertices_m - thickness_m * outward
     count = len(vertices_m)
-    edges = Edges.of(faces).single
+    edges = matched_half_edges(faces)[2]
     start, end = faces.ravel()[edges], np.roll(faces, -1, axis=1).ravel()[edges]
     rim = np.concatenate(
         [np.stack([end, start, start + count], 1), np.stack([end, start + count, end + count], 1)]
@@ -107,7 +107,7 @@ def hemmed(
 
     The round is a half circle as wide as the sheet is thick, cut into so many facets.
     """
-    edges = Edges.of(faces).single
+    edges = matched_half_edges(faces)[2]
     following = dict(
         zip(faces.ravel()[edges], np.roll(faces, -1, axis=1).ravel()[edges], strict=True)
     )

@@ -7,6 +7,7 @@ import pytest
 from numba import float32, njit
 
 import booth
+import scenes
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
 from paint_deposition.effects.learned_curves import CURVES
@@ -117,10 +118,9 @@ def test_the_kernel_computes_the_law(effect: type[Effect]):
     points = booth.door().points().select(slice(None, None, 7))
     path = booth.path_of(booth.serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))
     model = booth.MODEL.with_effect(effect.typical())
-    integrator = FilmIntegrator(points, model, 'double', parallel=False)
-    integrator.add(path)
+    film_um = scenes.painted(points, path, model, 'double').raw_um
     expected = reference_film_um(points, path, model)
-    np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=2e-9 * expected.max())
+    np.testing.assert_allclose(film_um, expected, rtol=0.0, atol=2e-9 * expected.max())
 
 
 @pytest.mark.slow
@@ -176,7 +176,6 @@ def test_laws_multiply():
     path = booth.path_of(booth.spot(z_m=0.45, standoff_m=0.35))
     chosen = [effect.typical() for effect in WITH_LAW]
     model = booth.MODEL.model_copy(update={'effects': tuple(chosen)})
-    integrator = FilmIntegrator(points, model, 'single', parallel=False)
-    integrator.add(path)
+    film_um = scenes.painted(points, path, model).raw_um
     expected = reference_film_um(points, path, model)
-    np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=3e-6 * expected.max())
+    np.testing.assert_allclose(film_um, expected, rtol=0.0, atol=3e-6 * expected.max())

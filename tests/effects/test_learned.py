@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from numba import float32, float64, njit
 
+import scenes
 from booth import MODEL, door, painted, panel, path_of, serpentine, spot
 from paint_deposition.effects import learned_laws as laws
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.learned_curves import CURVES, LearnedCurve, along_path, at_points
 from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedMap, PartGrid, places_m
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import collapse_um
 from paint_deposition.kernel.eq2_flux import Ray, in_precision
 from paint_deposition.part.points import SurfacePoints
@@ -133,11 +133,10 @@ def test_a_law_over_the_ray_acts_where_the_covariate_is_in_range_as_the_kernel_c
     some = door().points().select(slice(None, None, 7))
     leaning = path_of(spot(z_m=0.45, standoff_m=0.35))
     model = MODEL.with_effect(law_over(law.covariate))
-    integrator = FilmIntegrator(some, model, 'double', parallel=False)
-    integrator.add(leaning)
+    film_um = scenes.painted(some, leaning, model, 'double').raw_um
     expected = reference_film_um(some, leaning, model)
     assert not np.allclose(expected, reference_film_um(some, leaning, MODEL), rtol=1e-2, atol=0.0)
-    np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=2e-9 * expected.max())
+    np.testing.assert_allclose(film_um, expected, rtol=0.0, atol=2e-9 * expected.max())
 
 
 @pytest.mark.parametrize('covariate', ['time_s', 'spray_pass'])

@@ -13,7 +13,7 @@ from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.layout import term_weights
 from paint_deposition.film.live_film import LiveFilm, without_refused_states
-from paint_deposition.film.statistics import seconds_by_pattern
+from paint_deposition.film.statistics import PaintUsed
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import TriggerChange
@@ -63,7 +63,7 @@ def test_a_lag_takes_the_brush_along(lag_s):
     model = MODEL.with_effect(PoseLag(lag_s=lag_s))
     path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
     sprayed, _ = FilmIntegrator(lying_plane(), model).sprayed(path)
-    assert seconds_by_pattern(model, sprayed) == pytest.approx([0.5, 1.0], rel=1e-9)
+    assert PaintUsed.of(model, sprayed).spraying_s == pytest.approx({1: 0.5, 2: 1.0}, rel=1e-9)
 
 
 def test_terms_are_kept_apart_by_brush_and_brushes_are_in_order_each_once():

@@ -9,9 +9,9 @@ from trimesh.creation import box
 
 import paint_deposition as pd
 from booth import MODEL, path_of, serpentine
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.spray_geometry import facet_error, facet_errors_um
 from paint_deposition.part.points import SurfacePoints
+from scenes import painted
 from surfaces import refined, triangulated
 
 PATH = path_of(serpentine((0.3, 0.1, -0.1, -0.3), half_width_m=0.7, opens_at_m=0.65))
@@ -66,12 +66,7 @@ def cap(radius_m: float) -> Curve:
 
 
 def films_um(*places: SurfacePoints) -> list[np.ndarray]:
-    films = []
-    for points in places:
-        painted = FilmIntegrator(points, BELL)
-        painted.add(PATH)
-        films.append(painted.film_um)
-    return films
+    return [painted(points, PATH, BELL).film_um for points in places]
 
 
 def told_and_true(curve: Curve, edge_m: float, jitter: float) -> tuple[float, float]:

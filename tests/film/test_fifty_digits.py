@@ -7,11 +7,11 @@ from mpmath import mp, mpf
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
+from scenes import painted
 
 POSES, POINTS = 25, 40
 # Of the peak: what double arithmetic must keep, and what single promises.
@@ -100,10 +100,9 @@ def _random_path(rng) -> SprayPath:
 @pytest.mark.parametrize(('precision', 'tolerance'), [('double', DOUBLE), ('single', SINGLE)])
 def test_the_film_is_right_to_its_last_digits(worlds, precision, tolerance):
     for model, points, path, film in worlds:
-        integrator = FilmIntegrator(points, model, precision)
-        integrator.add(path)
+        film_um = painted(points, path, model, precision).film_um
         largest = max(film)
         assert largest > 0.01
         with mpmath.workdps(50):
-            both = zip(integrator.film_um.tolist(), film, strict=True)
+            both = zip(film_um.tolist(), film, strict=True)
             assert max(abs(mpf(ours) - exact) for ours, exact in both) < tolerance * largest

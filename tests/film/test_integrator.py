@@ -13,7 +13,7 @@ import scenes
 from booth import LOOKING_ALONG_Y
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ModelError
-from paint_deposition.film.integrator import FilmIntegrator, after_film_effects, gauge_reading_um
+from paint_deposition.film.integrator import FilmIntegrator, after_effects
 from paint_deposition.film.layout import SIGHT_STEP_M, emission_points_m, term_weights
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
@@ -125,9 +125,9 @@ def test_a_film_is_finite_and_nobody_changes_it():
     broken, bare = [Broken.typical()], np.zeros(len(points))
     nowhere = "'sag' gives a film of nan µm at"
     with np.errstate(all='ignore'), pytest.raises(ModelError, match=nowhere):
-        after_film_effects(bare, broken, points)
+        after_effects('on_film', bare, broken, points)
     with pytest.raises(ModelError, match="'sag' gives a reading of inf µm at 441 of 441 points"):
-        gauge_reading_um(film_um, broken, points)
+        after_effects('on_gauge', film_um, broken, points)
 
 
 def test_moving_part_and_gun_together_changes_nothing():

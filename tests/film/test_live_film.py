@@ -178,7 +178,7 @@ def test_a_film_that_carries_a_motion_on_keeps_to_models_with_its_brush():
     model = two_brushes()
     before = followed([TriggerChange(scenes.START_NS, 1.0, 2)], model)
     other_part = LiveFilm(lying_plane(), model)
-    other_part.reset_keeping_trigger_of(before)
+    other_part.reset(keeping_trigger_of=before)
     with pytest.raises(ModelError, match='brush 2 is not in the model'):
         other_part.switch_model(model.with_brush(1))
     other_part.add_poses(poses(straight_pass(TIMES_S), slice(0, 500)))

@@ -14,7 +14,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import PaintUsed, efficiency, film_statistics
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.part.zones import Box, PointZones, Zone, Zones
+from paint_deposition.part.zones import PointZones, Zone, Zones
 from scenes import lying_plane, stamps_ns, straight_pass
 
 
@@ -61,7 +61,7 @@ def test_zones_share_the_area_and_add_up_to_the_whole():
     """Each vertex counts against its own band, and area with no target not at all."""
     corners, middle = [[-1.0, -1, -1], [1, 1, 1]], [[-1.0, -1, -1], [0, 1, 1]]
     left, right = (
-        Zone(name, target, 2.0, (Box(np.array(box)),))
+        Zone(name, target, 2.0, np.array(box))
         for name, target, box in (('left', 10.0, middle), ('right', 20.0, corners))
     )
     x = np.array([-0.9, -0.5, -0.1, 0.1, 0.5, 0.9, 2.0])

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator
+from paint_deposition.film.integrator import FEW_RAYS
 from paint_deposition.kernel import blocks
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
@@ -13,7 +13,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 from patterns import PATTERNS
 from reference import reference_film_um
-from scenes import lying_plane, straight_pass, weaving
+from scenes import lying_plane, painted, straight_pass, weaving
 
 PROJECTIONS = {
     'default': Projection(),
@@ -34,19 +34,14 @@ def rough_surface(seed=3, count=900):
     return SurfacePoints(positions, normals)
 
 
-def film_um(points, path, model, precision='single'):
-    integrator = FilmIntegrator(points, model, precision)
-    integrator.add(path)
-    return integrator.raw_um
-
-
 @pytest.mark.parametrize('projection', PROJECTIONS.values(), ids=PROJECTIONS)
 @pytest.mark.parametrize('planar', PATTERNS.values(), ids=PATTERNS)
 def test_what_one_sub_step_reaches_is_right_to_rounding(planar, projection):
     model = DepositionModel(planar=planar, projection=projection)
     points = rough_surface()
     path = spray_path(weaving(np.arange(0.0, 3.0, 0.05)))[0].select(slice(40, 41))
-    expected, film = reference_film_um(points, path, model), film_um(points, path, model, 'double')
+    expected = reference_film_um(points, path, model)
+    film = painted(points, path, model, 'double').raw_um
     reached = film > 0.0
     assert np.count_nonzero(reached) > 100
     assert np.abs(film - expected)[reached].max() <= 1e-13 * expected.max()
@@ -61,22 +56,18 @@ def test_it_computes_eqs_1_and_2(planar, projection, precision):
     path, _ = spray_path(weaving(np.arange(0.0, 3.0, 0.05)))
     expected = reference_film_um(points, path, model)
     assert np.count_nonzero(expected) > 100
-    error = np.abs(film_um(points, path, model, precision) - expected)
+    error = np.abs(painted(points, path, model, precision).raw_um - expected)
     assert error.max() <= TOLERANCE[precision] * expected.max()
 
 
 def test_the_pattern_shift_moves_the_pattern_over_the_model_plane():
     path, _ = spray_path(straight_pass(np.linspace(0, 1, 51)))
     shift = np.array([0.03, -0.05])
-    model = DepositionModel()
-    shifted = film_um(
-        lying_plane(), path.with_(pattern_shift_m=np.tile(shift, (len(path), 1))), model
-    )
+    shifted = path.with_(pattern_shift_m=np.tile(shift, (len(path), 1)))
     # On the model plane a shift by (x, y) in tool axes is a move of the gun by (x, -y).
-    moved = film_um(
-        lying_plane(), path.with_(position_m=path.position_m + np.array([0.03, 0.05, 0.0])), model
-    )
-    assert np.allclose(shifted, moved, rtol=0, atol=2e-6 * moved.max())
+    moved = path.with_(position_m=path.position_m + np.array([0.03, 0.05, 0.0]))
+    one, other = (painted(lying_plane(), each).raw_um for each in (shifted, moved))
+    assert np.allclose(one, other, rtol=0, atol=2e-6 * other.max())
 
 
 @pytest.mark.slow
@@ -90,18 +81,18 @@ def test_what_is_left_out_of_reach_is_nothing(precision):
     points = lying_plane(0.7, 201)
     path, _ = spray_path(straight_pass(np.linspace(0, 4, 41), (-0.4, -0.2, 0.25), (0.4, 0.3, 0.3)))
     expected = reference_film_um(points, path, model)
-    error = np.abs(film_um(points, path, model, precision) - expected)
+    error = np.abs(painted(points, path, model, precision).raw_um - expected)
     assert error.max() < 1e-6 * expected.max()
 
 
 def test_the_number_of_threads_changes_no_bit(monkeypatch):
     path, _ = spray_path(weaving(np.arange(0.0, 2.0, 0.02)))
-    points, model = lying_plane(count=80), DepositionModel()
+    points = lying_plane(count=80)
     assert len(points) * len(path) > FEW_RAYS  # fewer are painted by one thread
     films = []
     for count in (1, 2, 3):
         monkeypatch.setattr(blocks, 'THREADS', count)
-        films.append(film_um(points, path, model))
+        films.append(painted(points, path).raw_um)
     assert films[0].max() > 1.0
     assert np.array_equal(films[0], films[1])
     assert np.array_equal(films[0], films[2])

@@ -17,10 +17,10 @@ PASSES = 4
 
 
 def resampled(corners_m, spacing_m):
-    """(N, 2) points at even steps along a polyline, and the distance along it."""
+    """(N, 2) points at even steps along a polyline up to its end, and the distance along it."""
     corners_m = np.array(corners_m, dtype=float)
     along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(corners_m, axis=0), axis=1)))
-    at = np.arange(0.0, along[-1], spacing_m)
+    at = np.append(np.arange(0.0, along[-1], spacing_m), along[-1])
     return np.stack([np.interp(at, along, corners_m[:, k]) for k in (0, 1)], axis=1), at
 
 
@@ -172,12 +172,8 @@ SPEED = 0.3
 
 def route(corners, **trigger):
     """Poses every 10 ms along straight legs at an even speed."""
-    corners = np.array(corners, dtype=float)
-    legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(legs)])
-    at = np.append(np.arange(0.0, along[-1], 0.01 * SPEED), along[-1])
-    xy = np.stack([np.interp(at, along, corners[:, axis]) for axis in range(2)], axis=1)
-    return level(at / SPEED, xy, **trigger)
+    xy, at_m = resampled(corners, 0.01 * SPEED)
+    return level(at_m / SPEED, xy, **trigger)
 
 
 # Three passes of 1.2 m, 0.3 m apart, with links between them.

@@ -22,11 +22,6 @@ CHANGES_NS = scenes.stamps_ns([0.0, 0.5037, 1.9, 2.4, 3.3])
 TRIGGER = {'trigger_stamps_ns': CHANGES_NS, 'trigger_flow': np.array([0.0, 1.0, 0.0, 0.7, 0.0])}
 
 
-def add_rows(builder, trajectory, rows):
-    columns = trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw
-    builder.add_poses(*(column[rows] for column in columns))
-
-
 def streamed(trajectory, sizes, whole_strokes=False, lag_ns=100_000_000):
     """The path of poses that come in batches of these sizes, in turns, with their triggers."""
     builder = PathBuilder(whole_strokes=whole_strokes)
@@ -36,13 +31,13 @@ def streamed(trajectory, sizes, whole_strokes=False, lag_ns=100_000_000):
     while start < len(trajectory):
         rows = slice(start, start + sizes[turn % len(sizes)])
         start, turn = rows.stop, turn + 1
-        add_rows(builder, trajectory, rows)
+        builder.add_poses(scenes.poses(trajectory, rows))
         newest = trajectory.stamps_ns[rows][-1]
         while triggers and triggers[0][0] <= newest:
             builder.add_trigger(*triggers.pop(0))
         pieces.append(builder.take(newest - lag_ns))
     pieces.append(builder.take(finish=True))
-    return SprayPath.joined(pieces), builder.counts
+    return SprayPath.joined(pieces), builder.screen.counts
 
 
 def to_and_fro(times_s=TIMES_S):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.pose_stream import MotionLog, PoseBatch, PoseScreen, TriggerChange
-from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow
+from paint_deposition.motion.stream_quality import SpeedNow, StreamSteps
 from paint_deposition.motion.trajectory import FlowSchedule, Trajectory, relative_flow
 
 GAP_NS = 250
@@ -141,11 +141,11 @@ def along(speeds: np.ndarray) -> np.ndarray:
 PASS_M = along(np.ones(499))
 
 
-def intervals_of(stamps, batch=50) -> Intervals:
-    intervals = Intervals()
+def intervals_of(stamps, batch=50) -> StreamSteps:
+    steps = StreamSteps()
     for start in range(0, len(stamps), batch):
-        intervals.add(np.asarray(stamps[start : start + batch], dtype=np.int64))
-    return intervals
+        steps.add_stamps(np.asarray(stamps[start : start + batch], dtype=np.int64))
+    return steps
 
 
 def test_steps_back_and_repeats_are_no_intervals_and_another_rhythm_is_learnt():
@@ -157,13 +157,13 @@ def test_steps_back_and_repeats_are_no_intervals_and_another_rhythm_is_learnt():
 
 
 def test_what_robots_do_is_no_jump():
-    jumps = Jumps()
-    jumps.add(STAMPS_NS, PASS_M)
+    steps = StreamSteps()
+    steps.add_places(STAMPS_NS, PASS_M)
     # Stamps that tremble, a gap with a long way in it, a stream that begins again elsewhere.
-    jumps.add(STAMPS_NS[-1:] + 100_000, PASS_M[-1:] + 0.004)
-    jumps.add(STAMPS_NS[-1:] + 2_000_000_000, PASS_M[-1:] + 2.0)
-    jumps.add(STAMPS_NS[:1], PASS_M[:1])
-    assert (jumps.count, jumps.fastest_m_per_s) == (0, 0.0)
+    steps.add_places(STAMPS_NS[-1:] + 100_000, PASS_M[-1:] + 0.004)
+    steps.add_places(STAMPS_NS[-1:] + 2_000_000_000, PASS_M[-1:] + 2.0)
+    steps.add_places(STAMPS_NS[:1], PASS_M[:1])
+    assert (steps.jumps, steps.fastest_m_per_s) == (0, 0.0)
 
 
 @pytest.mark.parametrize('batch', [1, 12, 500])

@@ -6,7 +6,7 @@ from scipy.spatial import Delaunay
 from trimesh.creation import cylinder
 
 from paint_deposition.errors import MeshError
-from paint_deposition.part.edges import Edges, coarse_faces
+from paint_deposition.part.edges import coarse_faces, matched_half_edges
 from paint_deposition.part.refinement import face_areas_m2, refine
 from paint_deposition.part.surface import Surface
 from surfaces import ball, flat, on_grid, triangulated
@@ -34,7 +34,7 @@ def test_slivers_and_all_stay_one_surface(seed):
         face_areas_m2(vertices, faces).sum(), rel=1e-12
     )
     assert rim_length_m(fine, refined) == pytest.approx(rim_length_m(vertices, faces), rel=1e-12)
-    assert not len(Edges.of(refined).clashing)
+    assert not len(matched_half_edges(refined)[1])
 
 
 def test_a_sliver_is_cut_into_pieces_as_wide_as_itself():
@@ -68,7 +68,7 @@ def upward(vertices, faces):
 
 def rim_length_m(vertices, faces):
     """Length of the edges that only one triangle has."""
-    single = Edges.of(faces).single
+    *_, single = matched_half_edges(faces)
     ends = vertices[np.roll(faces, -1, axis=1).ravel()[single]]
     return np.linalg.norm(vertices[faces.ravel()[single]] - ends, axis=1).sum()
 

@@ -18,7 +18,7 @@ from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
-from paint_deposition.part.zones import Box, Zone, Zones
+from paint_deposition.part.zones import Zone, Zones
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import ImproveRequest, PlanRequest
@@ -271,7 +271,7 @@ def test_gaps_between_poses_close_the_gun_and_flows_are_averaged():
 
 def zone(name, target_um, tolerance_um, low_x=-1.0, high_x=1.0):
     box = np.array([[low_x, -1.0, -1.0], [high_x, 1.0, 1.0]])
-    return Zone(name, target_um, tolerance_um, (Box(box),))
+    return Zone(name, target_um, tolerance_um, box)
 
 
 @pytest.mark.slow

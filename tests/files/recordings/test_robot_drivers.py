@@ -13,6 +13,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.pose_topics import sources_of_poses
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
+from paint_deposition.motion.pose_stream import PoseBatch
 from robot_arm import sweep, tip_poses
 from scenes import stamps_ns
 
@@ -183,9 +184,9 @@ def test_repeated_poses_leave_the_speed_of_the_gun_and_the_same_path_live():
     assert speed.max() < 1.7 * true
     live = PathBuilder()
     for part in np.array_split(np.arange(len(rows)), 60):
-        live.add_poses(STAMPS[part], POSITIONS[rows[part]], QUATERNIONS[rows[part]])
+        live.add_poses(PoseBatch(STAMPS[part], POSITIONS[rows[part]], QUATERNIONS[rows[part]]))
     again = live.take(finish=True)
-    assert live.counts == counts
+    assert live.screen.counts == counts
     assert np.array_equal(again.position_m, path.position_m)
 
 

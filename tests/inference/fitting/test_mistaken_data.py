@@ -11,7 +11,7 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.part.zones import Box, PointZones, Zone
+from paint_deposition.part.zones import PointZones, Zone
 
 pytestmark = pytest.mark.slow
 
@@ -151,7 +151,7 @@ def test_a_diagnosis_stops_at_exchanged_readings(panels):
 
 def test_a_calibration_warns_of_the_unit_and_of_targets_far_away(panels):
     rim, rest = np.array([[0.1, -1, 0], [0.3, 1, 2]]), np.array([[-1, -1, 0.5], [1, 1, 1]])
-    told = pd.Zones((Zone('rim', 20.0, 5.0, (Box(rim),)), Zone('rest', 1.0, 0.5, (Box(rest),))))
+    told = pd.Zones((Zone('rim', 20.0, 5.0, rim), Zone('rest', 1.0, 0.5, rest)))
     parts = []
     for part in panels.without(panels.readings.thickness_um < 3.0).experiments:
         number = told.of(part.surface.vertices_m, part.surface.normals)

@@ -79,7 +79,7 @@ def test_a_large_mesh_costs_a_robot_at_250_hz_no_pose(simulator, onlooker, wait_
         wait_until(lambda: replay.exit_code is not None, what='the replay')
     wait_until(lambda: node.film.counts.received == len(motion), what='every pose painted')
     assert node.film.counts.rejected == 0
-    assert node.inputs[0].intervals.long == 0
+    assert node.inputs[0].steps.long == 0
     # Meshes of 12 MB reached the subscriber meanwhile, and the last one shows the last pose.
     meshes = viewer.heard['thickness/mesh']
     wait_until(lambda: header_stamp_ns(meshes[-1]) == motion.stamps_ns[-1], what='the last mesh')

@@ -146,7 +146,7 @@ def test_two_guns_on_one_topic_are_reported(simulator, ros_context, spin, onlook
             stamp = MOTION.stamps_ns[row] + round(4e6 * side)
             gun.send_pose(stamp, position, MOTION.quaternions_xyzw[row])
     wait_until(lambda: viewer.reports(POSES, 'steps faster than a robot', b'\x01'))
-    wait_until(lambda: node.inputs[0].jumps.count > 40)
+    wait_until(lambda: node.inputs[0].steps.jumps > 40)
 
 
 def test_poses_that_the_queue_cannot_hold_are_counted(simulated, painted):

@@ -11,7 +11,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError, RecordingError
 from paint_deposition.film.common_film import TOTAL, Coats, CommonFilm, require_same_film_effects
 from paint_deposition.film.film import CoatFilm, Film, GunFilm
-from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
+from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision, after_effects
 from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.film.statistics import film_statistics, require_band
@@ -214,11 +214,13 @@ def simulate(
         at_points = _painted(part.points, seen, models, surface, 'double', progress)
         predicted_um = np.empty(len(part))
         for layer, seeing in laid.by_layer(readings.layer).items():
-            predicted_um[seeing] = at_points.layer_gauge_um(laid, layer)[: len(part)][seeing]
+            layer_um = at_points.layer_um(laid, layer)
+            shown_um = after_effects('on_gauge', layer_um, models[0].effects, part.points)
+            predicted_um[seeing] = shown_um[: len(part)][seeing]
         doubts = readings_in_doubt(surface, readings, predicted_um)
     added = []
-    for name in laid.names if coats else ():
-        rows = laid.guns_of(name)
+    for k, name in enumerate(laid.names if coats else ()):
+        rows = laid.guns(k, k + 1)
         used, coat_um = CommonFilm(common.guns[rows]).used, common.layer_um(laid, name)
         of_coat = film_statistics(coat_um, surface.vertex_areas_m2, used.emitted_cm3)
         added.append(CoatFilm(name, guns[rows], coat_um, of_coat, used))

@@ -86,16 +86,6 @@ class DepositionModel(BaseModel):
         kept = tuple(brush for brush in self.brushes if brush.number in wanted)
         return DepositionModel(brushes=kept, projection=self.projection, effects=self.effects)
 
-    def with_missing_brushes(self, given: 'DepositionModel') -> 'DepositionModel':
-        """A copy with the brushes of a given model that this one does not have."""
-        own = {brush.number for brush in self.brushes}
-        others = [brush for brush in given.brushes if brush.number not in own]
-        if not others:
-            return self
-        return DepositionModel(
-            brushes=(*self.brushes, *others), projection=self.projection, effects=self.effects
-        )
-
     @property
     def brush(self) -> int:
         """Number of the first brush; 0 where the only one has none."""
@@ -147,13 +137,8 @@ class DepositionModel(BaseModel):
         """How many times wider than the planar pattern the effects can make the spray."""
         return math.prod(effect.widening() for effect in self.effects)
 
-    @property
-    def reach_m(self) -> float:
-        """Radius on the model plane beyond which the flux is negligible [m]."""
-        return max(map(self.reach_of_m, self.patterns))
-
     def reach_of_m(self, planar: PlanarPattern) -> float:
-        """How far one of the patterns reaches on the model plane [m]."""
+        """Radius on the model plane beyond which the flux of a pattern is negligible [m]."""
         # Flux below this share of the peak is left out of the film.
         return planar.radius_of_flux_m(1e-6) * self.widening
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from paint_deposition.errors import MeshError, did_you_mean, some
 from paint_deposition.files.atomic import replacing, require_file, require_small_package
-from paint_deposition.part.edges import Edges, weld
+from paint_deposition.part.edges import matched_half_edges, weld
 from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
 from paint_deposition.part.surface import Surface
@@ -134,8 +134,8 @@ def _require_above_zero(name: str, value: float, meaning: str) -> None:
 
 def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np.ndarray:
     """Each connected surface wound alike, as most of its area was; a closed body outward."""
-    edges = Edges.of(faces)
-    if len(edges.clashing):
+    paired, clashing, single = matched_half_edges(faces)
+    if len(clashing):
         from trimesh import Trimesh
         from trimesh.graph import connected_component_labels
         from trimesh.repair import fix_winding
@@ -143,15 +143,15 @@ def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np
         mesh = Trimesh(vertices_m, faces, process=False, validate=False)
         fix_winding(mesh)
         turned = (np.asarray(mesh.faces) != faces).any(axis=1)
-        pairs = np.concatenate([edges.paired, edges.clashing]) // 3
+        pairs = np.concatenate([paired, clashing]) // 3
         sheet = connected_component_labels(pairs, len(faces))
         areas = face_areas_m2(vertices_m, faces)
         turned_share = np.bincount(sheet, areas * turned) / np.bincount(sheet, areas)
         turned ^= (turned_share > 0.5)[sheet]
         notes.append(f'{turned.sum()} triangles wound against their neighbours were turned round')
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
-        edges = Edges.of(faces)
-    if not len(edges.single) and not len(edges.clashing):
+        _, clashing, single = matched_half_edges(faces)
+    if not len(single) and not len(clashing):
         a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
         if np.einsum('ij,ij->', a, np.cross(b, c)) < 0.0:  # six times its volume
             notes.append('the closed body was inside out and was turned round')

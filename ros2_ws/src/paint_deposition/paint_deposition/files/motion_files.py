@@ -251,7 +251,8 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
     if bag is not None and (recorded.frames or not is_frame(named, part)):
         tree = read_frames(bag)
         recorded = _by_transforms(recorded, part, tree, bag, source.part_pose)
-        fixed = tree.connected(named)
+        others = (name for name in tree.names if name != named.lstrip('/'))
+        fixed = [name for name in others if tree.moving_between(named, name) == set()]
         known = f' (static transforms connect it to {", ".join(fixed)})' if fixed else ''
     if is_frame(recorded.frame_id, part):
         return recorded

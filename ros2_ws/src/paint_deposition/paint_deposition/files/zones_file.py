@@ -10,7 +10,7 @@ from paint_deposition.errors import PaintError, quoted
 from paint_deposition.files.atomic import read_yaml
 from paint_deposition.files.meshes import read_triangles
 from paint_deposition.film.statistics import require_band
-from paint_deposition.part.zones import Box, Patch, Region, Zone, Zones
+from paint_deposition.part.zones import Patch, Zone, Zones
 from paint_deposition.request import Name, Number, Text, validate
 
 FACES = 'a list of numbers of triangles from 0, as 7, or of ranges, as 0-119'
@@ -90,31 +90,31 @@ def read_zones(
         if entry.name in [zone.name for zone in zones]:
             raise PaintError(f"{path}: two zones are called '{entry.name}'; rename one")
         try:
-            regions = _regions(path.parent, entry, Path(mesh), scale, body)
+            patch = _patch(path.parent, entry, Path(mesh), scale, body)
         except PaintError as error:
             raise type(error)(f"{path}: zone '{entry.name}': {error}") from None
-        zones.append(Zone(entry.name, entry.target_um, entry.tolerance_um, regions))
+        box_m = np.array(entry.box) if entry.box else None
+        zones.append(Zone(entry.name, entry.target_um, entry.tolerance_um, box_m, patch))
     return Zones(tuple(zones))
 
 
-def _regions(
+def _patch(
     folder: Path, entry: ZoneEntry, part: Path, scale: float, body: str | None
-) -> tuple[Region, ...]:
-    regions: list[Region] = [Box(np.array(entry.box))] if entry.box else []
-    if entry.mesh or entry.body or entry.faces:
-        mesh = folder / entry.mesh if entry.mesh else part
-        of_mesh = entry.body or (None if entry.mesh else body)
-        vertices_m, faces, rows, _ = read_triangles(mesh, entry.mesh_scale or scale, of_mesh)
-        if entry.faces and rows is None:
-            raise PaintError(
-                f'faces: {mesh} has several bodies, in no order of their own; name one with body, '
-                f'which numbers its triangles from 0 (paint inspect {mesh} lists them)'
-            )
-        if entry.faces and rows is not None:
-            highest, most = int(rows[-1]), max(last for _, last in entry.faces)
-            if most > highest:
-                raise PaintError(f'faces: {mesh} has no triangle {most}, its last is {highest}')
-            within = [(rows >= a) & (rows <= b) for a, b in entry.faces]
-            faces = faces[np.logical_or.reduce(within)]
-        regions.append(Patch(vertices_m[faces]))
-    return tuple(regions)
+) -> Patch | None:
+    if not (entry.mesh or entry.body or entry.faces):
+        return None
+    mesh = folder / entry.mesh if entry.mesh else part
+    of_mesh = entry.body or (None if entry.mesh else body)
+    vertices_m, faces, rows, _ = read_triangles(mesh, entry.mesh_scale or scale, of_mesh)
+    if entry.faces and rows is None:
+        raise PaintError(
+            f'faces: {mesh} has several bodies, in no order of their own; name one with body, '
+            f'which numbers its triangles from 0 (paint inspect {mesh} lists them)'
+        )
+    if entry.faces and rows is not None:
+        highest, most = int(rows[-1]), max(last for _, last in entry.faces)
+        if most > highest:
+            raise PaintError(f'faces: {mesh} has no triangle {most}, its last is {highest}')
+        within = [(rows >= a) & (rows <= b) for a, b in entry.faces]
+        faces = faces[np.logical_or.reduce(within)]
+    return Patch(vertices_m[faces])

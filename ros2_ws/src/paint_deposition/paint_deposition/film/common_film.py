@@ -8,10 +8,9 @@ from itertools import accumulate, groupby
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError
-from paint_deposition.film.integrator import FilmIntegrator, after_film_effects, gauge_reading_um
+from paint_deposition.film.integrator import FilmIntegrator, after_effects
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.statistics import PaintUsed
 from paint_deposition.motion.trajectory import PoseCounts
@@ -70,11 +69,6 @@ class Coats:
         wet = tuple(k > 0 and name in on_wet for k, name in enumerate(names))
         return Coats(names, wet, tuple(accumulate(counts)))
 
-    def guns_of(self, name: str) -> slice:
-        """The guns that laid one of the coats."""
-        k = self.names.index(name)
-        return self._guns(k, k + 1)
-
     def by_layer(self, layers: np.ndarray) -> dict[str, np.ndarray]:
         """(N,) masks of the readings of each layer, by its name with the coats in their order.
 
@@ -109,9 +103,10 @@ class Coats:
             for stop, sign in ((k + 1, 1), (k, -1)):
                 if stop > first:
                     found[first, stop] = found.get((first, stop), 0) + sign
-        return tuple((sign, self._guns(*span)) for span, sign in found.items() if sign)
+        return tuple((sign, self.guns(*span)) for span, sign in found.items() if sign)
 
-    def _guns(self, first: int, stop: int) -> slice:
+    def guns(self, first: int, stop: int) -> slice:
+        """The guns that laid the coats from one number to before another."""
         return slice(self.ends[first - 1] if first else 0, self.ends[stop - 1])
 
     def _coats_of(self, layer: str) -> list[int]:
@@ -154,12 +149,14 @@ class CommonFilm:
     @property
     def film_um(self) -> np.ndarray:
         """(V,) film [um]."""
-        return after_film_effects(self.raw_um, self._effects, self.guns[0].points)
+        gun = self.guns[0]
+        return after_effects('on_film', self.raw_um, gun.model.effects, gun.points)
 
     @property
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
-        return gauge_reading_um(self.film_um, self._effects, self.guns[0].points)
+        gun = self.guns[0]
+        return after_effects('on_gauge', self.film_um, gun.model.effects, gun.points)
 
     @property
     def used(self) -> PaintUsed:
@@ -170,10 +167,6 @@ class CommonFilm:
         """(G,) solids that each gun laid on vertices of (V,) these areas [m2], as in a share."""
         return np.array([float(np.sum(share_um * areas_m2)) for share_um in self.shares_um])
 
-    @property
-    def _effects(self) -> list[Effect]:
-        return [effect for effect in self.guns[0].model.effects if not effect.is_neutral]
-
     def layer_um(self, coats: Coats, layer: str = TOTAL) -> np.ndarray:
         """(V,) film of a layer [um], see ``Coats.films_of``.
 
@@ -182,11 +175,6 @@ class CommonFilm:
         return sum_um(
             (sign, CommonFilm(self.guns[rows]).film_um) for sign, rows in coats.films_of(layer)
         )
-
-    def layer_gauge_um(self, coats: Coats, layer: str) -> np.ndarray:
-        """(V,) what a gauge shows that sees this layer alone [um]."""
-        effects, points = self.guns[0].model.effects, self.guns[0].points
-        return gauge_reading_um(self.layer_um(coats, layer), effects, points)
 
 
 @dataclass(frozen=True)
@@ -205,11 +193,6 @@ class LiveFilms:
         """Stamp of the newest pose of any gun that was kept."""
         return max((gun.newest_ns for gun in self.guns if gun.newest_ns is not None), default=None)
 
-    @property
-    def complete(self) -> bool:
-        """Whether all motion so far is remembered and can be painted again."""
-        return all(gun.log.complete for gun in self.guns)
-
     def snapshot(self) -> CommonFilm:
         """The film of everything received so far; equal to the last one if nothing was."""
         return CommonFilm(tuple(gun.snapshot() for gun in self.guns))
@@ -218,11 +201,6 @@ class LiveFilms:
         """Clear the film; one that no pose has reached forgets no change of a gun."""
         for gun in self.guns if self.counts.received else ():
             gun.reset()
-
-    def warm_up(self) -> None:
-        """Compile the models and compute all they need, before there is any motion."""
-        for gun in self.guns:
-            gun.warm_up()
 
 
 def require_same_film_effects(

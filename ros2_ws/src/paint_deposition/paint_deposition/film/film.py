@@ -172,19 +172,17 @@ class Film(Tabular):
         odd = odd or ((bare,) if self.statistics.coverage == 0.0 else ())
         recorded = self._of_each(lambda gun: gun.trajectory.warnings)
         brushes = self._of_each(lambda gun: impossible_brushes(gun.model))
-        return (*recorded, *odd, *brushes, *self._negative(), *self.doubts)
-
-    def _negative(self) -> tuple[str, ...]:
-        """Where a law on the film, of first order as sag, is stretched beyond where it holds."""
+        negative = []
         least_um = float(self.film_um.min())
-        if least_um > -1e-4 * float(self.film_um.max()):
-            return ()
-        effects = (e for gun in self.guns for e in gun.model.effects if not e.is_neutral)
-        causes = ', '.join(dict.fromkeys(e.id for e in effects if e.acts('on_film')))
-        return (
-            f'the film is {least_um:.2g} µm at its least, and no film is below 0: the law of '
-            f'{causes} does not hold at this size; make it smaller or leave it out',
-        )
+        # A law on the film, of first order as sag, is stretched beyond where it holds.
+        if least_um <= -1e-4 * float(self.film_um.max()):
+            effects = (e for gun in self.guns for e in gun.model.effects if not e.is_neutral)
+            causes = ', '.join(dict.fromkeys(e.id for e in effects if e.acts('on_film')))
+            negative.append(
+                f'the film is {least_um:.2g} µm at its least, and no film is below 0: the law of '
+                f'{causes} does not hold at this size; make it smaller or leave it out'
+            )
+        return (*recorded, *odd, *brushes, *negative, *self.doubts)
 
     def _of_each(self, lines: Callable[[GunFilm], tuple[str, ...]]) -> tuple[str, ...]:
         return tuple(

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 
@@ -124,17 +125,27 @@ def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
         yield alone
         return
     aim = _wrong_axis(view, boxes) or _off_model_plane(view, boxes)
-    hitting = [
-        one for one, share in zip(view.passes, view.landing_of_passes, strict=True)
-        if share >= LEAST_LANDING
-    ]  # fmt: skip
+    shares = view.landing_of_passes
+    hits = [share >= LEAST_LANDING for share in shares]
+    hitting = [*compress(view.passes, hits)]
     aside = hitting and _aside(view, hitting) and _aside(view, view.passes)
     if aim:
         yield aim
     if aside:
         yield aside
-    elif not aim and len(hitting) < len(view.passes):
-        yield _missing(view)
+    if aim or aside or all(hits):
+        return
+    missing = [str(number) for number, hit in enumerate(hits, start=1) if not hit]
+    which = f'pass {missing[0]} of {len(shares)} misses'
+    if len(missing) > 1:
+        which = f'passes {", ".join(missing[:-1])} and {missing[-1]} of {len(shares)} miss'
+    cause = "check the trigger, the part's pose and that the mesh is the whole part"
+    if np.all(view.whole.flow > 0.0):
+        cause = (
+            'no trigger is known, so the gun is taken to spray there, too; name it with '
+            '--state-topic'
+        )
+    yield f'{which} the part, next to none of that paint goes over it: {cause}'
 
 
 def _other_unit(view: GunView) -> str:
@@ -254,18 +265,3 @@ def _aside(view: GunView, passes: list[SprayPath]) -> str:
         f'{direction}, and run {past:.2f} m past its edge there: unless only some of the '
         "part was to be painted, the part's pose or the TCP is shifted"
     )
-
-
-def _missing(view: GunView) -> str:
-    shares = view.landing_of_passes
-    missing = [str(k + 1) for k, share in enumerate(shares) if share < LEAST_LANDING]
-    which = f'pass {missing[0]} of {len(shares)} misses'
-    if len(missing) > 1:
-        which = f'passes {", ".join(missing[:-1])} and {missing[-1]} of {len(shares)} miss'
-    cause = "check the trigger, the part's pose and that the mesh is the whole part"
-    if np.all(view.whole.flow > 0.0):
-        cause = (
-            'no trigger is known, so the gun is taken to spray there, too; name it with '
-            '--state-topic'
-        )
-    return f'{which} the part, next to none of that paint goes over it: {cause}'

@@ -5,7 +5,8 @@ come in. The film is the same to the last bit.
 """
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -16,8 +17,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
 from paint_deposition.film import layout
 from paint_deposition.film.statistics import PaintUsed
-from paint_deposition.kernel.blocks import LARGEST_BLOCK, shared_among_threads
-from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
+from paint_deposition.kernel.blocks import LARGEST_BLOCK, THREADS, shared_among_threads
+from paint_deposition.kernel.eq2_flux import CENTRE, REACH, RING, TERMS, Law, compile_kernel
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
@@ -37,13 +38,10 @@ class Steps:
 
     rows: np.ndarray  # (M, 16) sub-steps that spray, see ``layout.step_rows``
     brush: np.ndarray  # (M,) row among the model's patterns of the one that sprays
-    # What is seen on them, see ``layout.Sight``.
+    # (N,) uint8, 1 where a point is seen, a run of points for each of S tracings and each block.
     seen: np.ndarray
-    first: np.ndarray
-    tracing: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.rows)
+    first: np.ndarray  # (S, B) where the run of a tracing and a block begins
+    tracing: np.ndarray  # (M,) which tracing holds
 
 
 class FilmIntegrator:
@@ -70,7 +68,8 @@ class FilmIntegrator:
         self._parallel = parallel
         self._real: Any = np.float32 if precision == 'single' else np.float64
         self._occluder = occluder
-        self._lines_of_sight: layout.LinesOfSight | None = None
+        # Of the sorted points; where nothing stands higher over a point it is seen.
+        self._horizon: np.ndarray | None = None
         self._keep_absent_laws = keep_absent_laws
         self._blocks = points.blocks(self._real)
         self.reset()
@@ -83,14 +82,25 @@ class FilmIntegrator:
             model.projection, self.points.down, self.points.outward, self.points.centre_m
         )
         self._shadowed = model.shadow > 0.0 and self._occluder is not None
-        if self._occluder is not None and self._shadowed and self._lines_of_sight is None:
-            self._lines_of_sight = layout.LinesOfSight(self._occluder, self.points, self._blocks)
+        if self._occluder is not None and self._shadowed and self._horizon is None:
+            order = self._blocks.order
+            self._positions_m, self._normals = (
+                self.points.positions_m[order],
+                self.points.normals[order],
+            )
+            self._horizon = self._occluder.horizon_sines(self._positions_m, self._normals)
         # Absent effects are left out rather than computed: they change nothing, to the bit.
         self._effects = [effect for effect in model.effects if not effect.is_neutral]
         compiled = model.effects if self._keep_absent_laws else self._effects
-        *laws, parameters = layout.compiled_laws(compiled)
+        # Each law with how many parameters it takes; one unused number where there are none.
+        laws: list[tuple[tuple[Law, int], ...]] = []
+        parameters: list[float] = []
+        for kind in ('flux_factor', 'pattern_scale'):
+            chosen = [(e, law) for e in compiled if (law := getattr(type(e), kind)) is not None]
+            laws.append(tuple((law, len(effect.values())) for effect, law in chosen))
+            parameters += [value for effect, _ in chosen for value in effect.values()]
         self._variant = (*laws, self._shadowed, self._real)
-        self._parameters = parameters.astype(self._real)
+        self._parameters = np.array(parameters or [0.0], dtype=self._real)
 
     def reset(self) -> None:
         """Back to bare metal."""
@@ -134,7 +144,7 @@ class FilmIntegrator:
         """Paint along a path that was prepared for the effects and projection of the model."""
         constants = layout.model_constants(self.model)
         self._run(False, steps, constants, self._film, self._recent, np.empty((TERMS, 0)))
-        self._done += len(steps)
+        self._done += len(steps.rows)
 
     def terms(self, steps: Steps) -> np.ndarray:
         """(7 B, V) what the film of these sub-steps alone is made of, by brush.
@@ -142,7 +152,11 @@ class FilmIntegrator:
         See ``layout.term_weights``. They depend on r, sigma1 and sigma2, and where the asymmetry
         is spread over the ring, but not on K1 and K2.
         """
-        constants, none = layout.term_constants(self.model), np.empty(0)
+        # Constants with which the terms are kept apart, whatever their gains.
+        even, none = {'K1_cm3_per_s': 1.0, 'K2': 0.5}, np.empty(0)
+        patterns = (planar.model_copy(update=even) for planar in self.model.patterns)
+        constants = layout.model_constants(self.model.with_patterns(patterns))
+        constants[:, [RING, CENTRE]] += 1.0
         terms = np.zeros((len(constants), TERMS, len(self._film)))
         for row, of_brush in enumerate(terms):
             on = steps.brush == row
@@ -163,18 +177,60 @@ class FilmIntegrator:
         """What the kernel reads; ``reach`` of lines of sight, if it is not the pattern's."""
         rows = layout.step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
         brush = self.model.pattern_rows(path.brush)
-        if not (self._lines_of_sight and self._shadowed):
+        if self._occluder is None or not self._shadowed:
             run = np.ones(LARGEST_BLOCK, dtype=np.uint8)  # everything is seen
             first = np.zeros((1, len(self._blocks.spheres)), np.int64)
             return Steps(rows, brush, run, first, np.zeros(len(rows), np.int64))
         constants = layout.model_constants(self.model)
         if reach is not None:
             constants[:, REACH] = reach
-        sight, self._traced_from = self._lines_of_sight.along(
-            layout.emission_points_m(self.model, path), rows, brush,
-            constants.astype(self._real), self._traced_from,
-        )  # fmt: skip
-        return Steps(rows, brush, *sight)
+        origins_m = layout.emission_points_m(self.model, path)
+        constants = constants.astype(self._real)
+        return self._traced(self._occluder.sees, origins_m, rows, brush, constants)
+
+    def _traced(
+        self, sees: Callable[[np.ndarray, np.ndarray], np.ndarray], origins_m: np.ndarray,
+        rows: np.ndarray, brush: np.ndarray, constants: np.ndarray,
+    ) -> Steps:  # fmt: skip
+        """Trace rays from the first origin (M, 3) and then after every SIGHT_STEP_M of travel.
+
+        A point whose normal looks away needs no ray, nor does one over which the gun stands higher
+        than all of the part, nor any of a block that lies out of the reach in ``constants``.
+        """
+        # (S, 3) origins from which to trace, and (M,) the row of them that holds.
+        places_m = [] if self._traced_from is None else [self._traced_from]
+        tracing = np.empty(len(origins_m), dtype=np.int64)
+        for step, origin in enumerate(origins_m):
+            if not places_m or np.linalg.norm(origin - places_m[-1]) > layout.SIGHT_STEP_M:
+                places_m.append(origin)
+            tracing[step] = len(places_m) - 1
+        traced, blocks = np.reshape(places_m, (-1, 3)), self._blocks
+        lit = layout.reached_blocks(blocks.spheres, rows, tracing, brush, constants, len(traced))
+        which, block = np.nonzero(lit)
+        sizes = np.diff(blocks.bounds)[block]
+        # The first run is that of whatever lies out of reach.
+        starts = LARGEST_BLOCK + np.cumsum(sizes) - sizes
+        first = np.zeros(lit.shape, dtype=np.int64)
+        first[which, block] = starts
+        seen = np.ones(LARGEST_BLOCK + sizes.sum(), dtype=np.uint8)
+        begins = np.searchsorted(tracing, np.arange(len(traced) + 1))
+
+        def trace(start: int, stop: int) -> None:
+            some = slice(start, stop)
+            places, tracings, points = layout.rays_to_trace(
+                blocks.bounds, blocks.points, blocks.normals, self._positions_m, self._normals,
+                self._horizon, traced, rows, begins, brush, constants,
+                which[some], block[some], starts[some],
+            )  # fmt: skip
+            seen[places] = sees(traced[tracings], self._positions_m[points])
+
+        # RAYS_AT_ONCE or a little more in each.
+        parts = np.cumsum(sizes) // layout.RAYS_AT_ONCE
+        cuts = np.flatnonzero(np.diff(parts, prepend=-1))
+        with ThreadPoolExecutor(THREADS) as threads:
+            list(threads.map(trace, cuts, [*cuts[1:], len(sizes)]))
+        self._traced_from = traced[-1] if len(traced) else None
+        return Steps(rows, brush, seen, first, tracing)
 
     def _run(
         self, separate_terms: bool, steps: Steps, constants: np.ndarray,
@@ -187,7 +243,7 @@ class FilmIntegrator:
             constants.astype(self._real), self._parameters,
         )  # fmt: skip
         kernel = compile_kernel(*self._variant, separate_terms)
-        many = self._parallel and len(steps) * len(self._film) >= FEW_RAYS
+        many = self._parallel and len(steps.rows) * len(self._film) >= FEW_RAYS
         count = len(blocks.spheres)
         shared_among_threads(
             count, lambda first, last: kernel(first, last, *arguments), 1 if many else count
@@ -208,46 +264,34 @@ class FilmIntegrator:
     @property
     def film_um(self) -> np.ndarray:
         """(V,) film [um]."""
-        return after_film_effects(self.raw_um, self._effects, self.points)
+        return after_effects('on_film', self.raw_um, self._effects, self.points)
 
     @property
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
-        return gauge_reading_um(self.film_um, self._effects, self.points)
+        return after_effects('on_gauge', self.film_um, self._effects, self.points)
 
 
-def after_film_effects(
-    raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints
+def after_effects(
+    place: Literal['on_film', 'on_gauge'],
+    film_um: np.ndarray,
+    effects: Iterable[Effect],
+    points: SurfacePoints,
 ) -> np.ndarray:
-    """(V,) film that is there in the end [um] where (V,) arrived [um].
+    """(V,) film that is there in the end, where (V,) arrived, or what a gauge shows on it [um].
 
     Raises:
-        ModelError: an effect gives a film that is not finite.
+        ModelError: an effect gives a film or a reading that is not finite.
     """
     for effect in effects:
-        raw_um = _finite(effect.on_film(raw_um, points), effect, 'film')
-    return raw_um
-
-
-def gauge_reading_um(
-    film_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints
-) -> np.ndarray:
-    """(V,) what a gauge shows [um] on a film (V,) [um].
-
-    Raises:
-        ModelError: an effect gives a reading that is not finite.
-    """
-    for effect in effects:
-        film_um = _finite(effect.on_gauge(film_um, points), effect, 'reading')
+        if effect.is_neutral:
+            continue
+        film_um = getattr(effect, place)(film_um, points)
+        odd = np.flatnonzero(~np.isfinite(film_um))
+        if len(odd):
+            what = 'film' if place == 'on_film' else 'reading'
+            raise ModelError(
+                f'effect {effect.id!r} gives a {what} of {film_um[odd[0]]} µm at {len(odd)} of '
+                f'{len(film_um)} points; correct its law, or take it out of the model'
+            )
     return film_um
-
-
-def _finite(values_um: np.ndarray, effect: Effect, what: str) -> np.ndarray:
-    finite = np.isfinite(values_um)
-    if not finite.all():
-        odd = np.flatnonzero(~finite)
-        raise ModelError(
-            f'effect {effect.id!r} gives a {what} of {values_um[odd[0]]} µm at {len(odd)} of '
-            f'{len(values_um)} points; correct its law, or take it out of the model'
-        )
-    return values_um

@@ -1,23 +1,15 @@
-"""What the kernel reads: sub-steps, constants of the model, and which points the gun sees."""
+"""What the kernel reads: sub-steps, constants of the model, and which rays are to be traced."""
 
 import math
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.kernel import eq2_flux as kernel
-from paint_deposition.kernel.blocks import LARGEST_BLOCK, THREADS, Blocks
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, Law, within_reach
+from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, within_reach
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.visibility import Occluder
-
-Laws = tuple[tuple[Law, int], ...]
 
 
 def model_constants(model: DepositionModel) -> np.ndarray:
@@ -38,29 +30,6 @@ def model_constants(model: DepositionModel) -> np.ndarray:
         c[kernel.REACH] = model.reach_of_m(planar)
         c[kernel.SHADOW] = model.shadow
     return constants
-
-
-def compiled_laws(effects: Sequence[Effect]) -> tuple[Laws, Laws, np.ndarray]:
-    """What the kernel inlines of effects.
-
-    Flux factors and pattern scales, each with how many parameters it takes; (n,) parameters, one
-    unused number where there are none.
-    """
-    found: list[Laws] = []
-    values: list[float] = []
-    for kind in ('flux_factor', 'pattern_scale'):
-        chosen = [e for e in effects if getattr(type(e), kind) is not None]
-        found.append(tuple((getattr(type(e), kind), len(e.values())) for e in chosen))
-        values += [value for effect in chosen for value in effect.values()]
-    return found[0], found[1], np.array(values or [0.0])
-
-
-def term_constants(model: DepositionModel) -> np.ndarray:
-    """(B, 11) constants with which the film's terms are kept apart, whatever their gains."""
-    even = {'K1_cm3_per_s': 1.0, 'K2': 0.5}
-    c = model_constants(model.with_patterns(p.model_copy(update=even) for p in model.patterns))
-    c[:, [kernel.RING, kernel.CENTRE]] += 1.0
-    return c
 
 
 def term_weights(planar: PlanarPattern) -> tuple[np.ndarray, np.ndarray]:
@@ -120,83 +89,9 @@ SIGHT_STEP_M = 0.01
 RAYS_AT_ONCE = 200_000
 
 
-# What is seen on M sub-steps: (N,) uint8, 1 where a point is seen, a run of points for each of S
-# tracings and each block; (S, B) where the run of a tracing and a block begins; and (M,) which
-# tracing holds.
-Sight = tuple[np.ndarray, np.ndarray, np.ndarray]
-
-
-class LinesOfSight:
-    """Traces rays from the gun to those points, also given as the kernel's blocks, that it paints.
-
-    A point whose normal looks away needs no ray, nor does one over which the gun stands higher
-    than all of the part, nor any of a block that lies out of the pattern's reach.
-    """
-
-    def __init__(self, obstacle: Occluder, points: SurfacePoints, blocks: Blocks) -> None:
-        self._obstacle, self._blocks = obstacle, blocks
-        self._positions_m = points.positions_m[blocks.order]
-        self._normals = points.normals[blocks.order]
-        self._horizon = obstacle.horizon_sines(self._positions_m, self._normals)
-
-    def along(
-        self,
-        origins_m: np.ndarray,
-        rows: np.ndarray,
-        brush: np.ndarray,
-        constants: np.ndarray,
-        last_m: np.ndarray | None,
-    ) -> tuple[Sight, np.ndarray | None]:
-        """Trace from the first origin and then after every SIGHT_STEP_M of travel.
-
-        Of the sub-steps their emission points (M, 3), their ``rows`` (M, 16) as the kernel reads
-        them, and the row (M,) of each in the brushes' constants (B, 11). ``last_m`` is the origin
-        of the tracing that held on the sub-step before. Returned are what is seen, and the origin
-        of the last tracing.
-        """
-        # (S, 3) origins from which to trace, and (M,) the row of them that holds.
-        places_m = [] if last_m is None else [last_m]
-        tracing = np.empty(len(origins_m), dtype=np.int64)
-        for step, origin in enumerate(origins_m):
-            if not places_m or np.linalg.norm(origin - places_m[-1]) > SIGHT_STEP_M:
-                places_m.append(origin)
-            tracing[step] = len(places_m) - 1
-        traced = np.reshape(places_m, (-1, 3))
-        blocks = self._blocks
-        lit = _within_reach(blocks.spheres, rows, tracing, brush, constants, len(traced))
-        which, block = np.nonzero(lit)
-        sizes = np.diff(blocks.bounds)[block]
-        # The first run is that of whatever lies out of reach.
-        starts = LARGEST_BLOCK + np.cumsum(sizes) - sizes
-        first = np.zeros(lit.shape, dtype=np.int64)
-        first[which, block] = starts
-        seen = np.ones(LARGEST_BLOCK + sizes.sum(), dtype=np.uint8)
-        begins = np.searchsorted(tracing, np.arange(len(traced) + 1))
-
-        def trace(part: slice) -> None:
-            places, tracings, points = _rays_to_trace(
-                blocks.bounds, blocks.points, blocks.normals, self._positions_m, self._normals,
-                self._horizon, traced, rows, begins, brush, constants,
-                which[part], block[part], starts[part],
-            )  # fmt: skip
-            seen[places] = self._obstacle.sees(traced[tracings], self._positions_m[points])
-
-        with ThreadPoolExecutor(THREADS) as threads:
-            list(threads.map(trace, _parts(sizes)))
-        return (seen, first, tracing), traced[-1] if len(traced) else last_m
-
-
-def _parts(sizes: np.ndarray) -> Iterator[slice]:
-    """Cut runs of these sizes into parts of RAYS_AT_ONCE or a little more."""
-    parts = np.cumsum(sizes) // RAYS_AT_ONCE
-    cuts = np.flatnonzero(np.diff(parts, prepend=-1))
-    for start, stop in zip(cuts, [*cuts[1:], len(sizes)], strict=True):
-        yield slice(start, stop)
-
-
 @njit(cache=True, nogil=True)
 @named_for_its_code
-def _within_reach(spheres, rows, tracing, brush, constants, tracings):
+def reached_blocks(spheres, rows, tracing, brush, constants, tracings):
     """(S, B) bool, whether any sub-step of a tracing reaches a block."""
     lit = np.zeros((tracings, len(spheres)), dtype=np.bool_)
     for m in range(len(rows)):
@@ -208,7 +103,7 @@ def _within_reach(spheres, rows, tracing, brush, constants, tracings):
 
 @njit(cache=True, nogil=True)
 @named_for_its_code
-def _rays_to_trace(
+def rays_to_trace(
     bounds, p, n, positions, normals, horizon, traced, rows, begins, brush, constants, which,
     block, starts,
 ):  # fmt: skip

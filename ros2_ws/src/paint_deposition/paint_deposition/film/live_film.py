@@ -84,12 +84,12 @@ class LiveFilm:
     @property
     def counts(self) -> PoseCounts:
         """What became of the poses since the last reset."""
-        return self._builder.counts
+        return self._builder.screen.counts
 
     @property
     def newest_ns(self) -> int | None:
         """Stamp of the newest pose that was kept."""
-        return self._builder.newest_ns
+        return self._builder.screen.newest_ns
 
     @property
     def _settled_ns(self) -> int:
@@ -123,16 +123,13 @@ class LiveFilm:
         passed = bisect_right(self._changes, self._reached_ns, key=_STAMP)
         return self._changes[max(passed - 1, 0) :]
 
-    def reset(self) -> None:
-        """Clear the film; the gun stays on or off if the motion continues."""
-        self.reset_keeping_trigger_of(self)
-
-    def reset_keeping_trigger_of(self, before: 'LiveFilm') -> None:
-        """Clear the film and take over the state of the gun from another film.
+    def reset(self, keeping_trigger_of: 'LiveFilm | None' = None) -> None:
+        """Clear the film; the gun stays on or off as in another film, by default in this one.
 
         Raises:
             ModelError: the model does not have the brush that the gun sprays with.
         """
+        before = keeping_trigger_of or self
         carried, reached_ns = before.carried_over, before._reached_ns
         brushes = {change.brush for change in carried if change.flow > 0.0}
         self.model.require_brushes(brushes)
@@ -186,7 +183,7 @@ class LiveFilm:
             return
         self.log.add(batch)
         before_ns = self.newest_ns
-        self._builder.add_poses(batch.stamps_ns, batch.positions_m, batch.quaternions_xyzw)
+        self._builder.add_poses(batch)
         if self.newest_ns is not None and self.newest_ns != before_ns:
             self._reached_ns = self.newest_ns
         self._integrator.add(self._builder.take(self._settled_ns))
@@ -226,7 +223,7 @@ class LiveFilm:
         """Compile the model and compute all it needs, before there is any motion."""
         far_away = np.full((2, 3), 1e3)
         builder = PathBuilder()
-        builder.add_poses([0, 1_000_000], far_away, np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
+        builder.add_poses(PoseBatch.of([0, 1_000_000], far_away, np.eye(4)[[3, 3]]))
         unpainted = self._integrator.fork()
         path = builder.take(finish=True)
         unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))

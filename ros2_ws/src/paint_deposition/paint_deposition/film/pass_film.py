@@ -110,7 +110,7 @@ def pass_film_um(
     """
     # Middles and lengths of sub-steps, even in u with distance = FINEST_STEP_M sinh(u).
     magnification = model.projection.magnification(standoff_m)
-    far = 1.5 * model.reach_m * magnification
+    far = 1.5 * max(map(model.reach_of_m, model.patterns)) * magnification
     finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * magnification
     u_far = math.asinh(far / FINEST_STEP_M)
     half = math.ceil(u_far * fineness * 5.0 * far / finest)

@@ -109,8 +109,8 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> tu
 
     The part is turned to the gun; of the model, pattern and projection count, effects do not.
     """
-    edges = surface.curved_edges
-    if not len(edges):
+    edges, count = surface.curved_edges, len(surface.curved_edges.middles_m)
+    if not count:
         return 0.0, ''
     some = slice(None, None, 1 + len(surface.vertices_m) // VERTICES)
     points = SurfacePoints(
@@ -119,7 +119,7 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> tu
     )
     painted = FilmIntegrator(points, model.model_copy(update={'effects': ()}))
     film_um = painted.raw_of(path.select(slice(None, None, 1 + len(path) // SUB_STEPS)))
-    count, peak_um = len(edges), film_um.max()
+    peak_um = film_um.max()
     if peak_um == 0.0:
         return 0.0, ''
     error_um = np.abs(film_um[count : 2 * count] - film_um[:count])

@@ -185,7 +185,9 @@ class PaintUsed:
     @staticmethod
     def of(model: DepositionModel, path: SprayPath) -> PaintUsed:
         """Along a path that the effects on it have been applied to."""
-        seconds = seconds_by_pattern(model, path).tolist()
+        on = path.flow > 0.0
+        rows, sprayed_s = model.pattern_rows(path.brush[on]), (path.dwell_s * path.flow)[on]
+        seconds = [float(np.sum(sprayed_s[rows == k])) for k in range(len(model.patterns))]
         K1 = np.array([planar.K1_cm3_per_s for planar in model.patterns])
         numbers = [brush.number for brush in model.brushes] or [ONLY_BRUSH]
 
@@ -255,13 +257,6 @@ def paint_sentence(paint: PaintUsed, film: FilmStatistics) -> str:
     if not math.isnan(paint.solids):
         said.append(f'mean wet film {film.mean_um / paint.solids:.1f} µm')
     return ', '.join(said)
-
-
-def seconds_by_pattern(model: DepositionModel, path: SprayPath) -> np.ndarray:
-    """(B,) time sprayed with each of the model's patterns, weighted by the flow [s]."""
-    on = path.flow > 0.0
-    rows, sprayed_s = model.pattern_rows(path.brush[on]), (path.dwell_s * path.flow)[on]
-    return np.array([np.sum(sprayed_s[rows == row]) for row in range(len(model.patterns))])
 
 
 def impossible_brushes(model: DepositionModel) -> tuple[str, ...]:

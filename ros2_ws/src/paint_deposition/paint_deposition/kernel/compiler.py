@@ -39,62 +39,51 @@ def kinds_at_hand() -> list[str]:
     return [kind for kind, (needs, _) in KINDS.items() if all(map(has.get, needs.split()))]
 
 
-def compiler_for(kind: str) -> Callable[..., Any]:
-    """Numba's ``njit`` for a kind of processor; call it once for each."""
-    if config.CPU_FEATURES is not None:
-        features = config.CPU_FEATURES
-    else:
-        features = KINDS[kind][1] if kind in KINDS else get_host_cpu_features()
-    name = f'paint-{kind}'
-
-    class Code(JITCPUCodegen):
-        def _get_host_cpu_name(self) -> str:
-            return kind
-
-        def _get_host_cpu_features(self) -> str:
-            return features
-
-    class Context(CPUContext):
-        def init(self) -> None:
-            super().init()
-            self._internal_codegen = Code(name)
-
-    class Descriptor(CPUTarget):
-        @cached_property
-        def _toplevel_target_context(self) -> Context:
-            return Context(self.typing_context, self._target_name)
-
-    class Dispatcher(CPUDispatcher):
-        targetdescr = Descriptor(name)
-
-    def njit(*functions: Callable[..., Any], nopython: bool = True, **options: Any) -> Any:
-        return numba.jit(*functions, nopython=nopython, _target=name, **options)
-
-    # What Numba's own functions and the overloads of `fast_math` are compiled by within ours.
-    target = type(name, (CPU,), {})
-    target_registry[name] = target
-    dispatcher_registry[target] = Dispatcher
-    jit_registry[target] = njit
-    return njit
-
-
 KIND = config.CPU_NAME or next(iter(kinds_at_hand()), llvm.get_host_cpu_name())
-njit = compiler_for(KIND)
+FEATURES = config.CPU_FEATURES
+if FEATURES is None:
+    FEATURES = KINDS[KIND][1] if KIND in KINDS else get_host_cpu_features()
+TARGET_NAME = f'paint-{KIND}'
 
+
+class Code(JITCPUCodegen):
+    """Numba's code generator for the kind of processor."""
+
+    def _get_host_cpu_name(self) -> str:
+        return KIND
+
+    def _get_host_cpu_features(self) -> str:
+        return FEATURES
+
+
+class Descriptor(CPUTarget):
+    """Numba's description of the target, with our code generator."""
+
+    @cached_property
+    def _toplevel_target_context(self) -> CPUContext:
+        context = CPUContext(self.typing_context, self._target_name)
+        context._internal_codegen = Code(TARGET_NAME)
+        return context
+
+
+class Dispatcher(CPUDispatcher):
+    """Functions that are compiled for the target."""
+
+    targetdescr = Descriptor(TARGET_NAME)
+
+
+def njit(*functions: Callable[..., Any], nopython: bool = True, **options: Any) -> Any:
+    """Numba's ``njit`` for the kind of processor."""
+    return numba.jit(*functions, nopython=nopython, _target=TARGET_NAME, **options)
+
+
+# What Numba's own functions and the overloads of `fast_math` are compiled by within ours.
+target = type(TARGET_NAME, (CPU,), {})
+target_registry[TARGET_NAME] = target
+dispatcher_registry[target] = Dispatcher
+jit_registry[target] = njit
 
 Compiled = TypeVar('Compiled', bound=Callable[..., Any])
-
-
-def identity(laws: Sequence[Callable[..., float]], *variant: object) -> str:
-    """A name for the code of laws, of everything that is compiled with them, and the variant.
-
-    Compiled code refers to the laws' modules by name, so those names are part of it: the module
-    of a user's own effect is named by its source.
-    """
-    parts = [_code_around(), repr((numba.__version__, variant)).encode()]
-    for law in laws:
-        parts.extend(_compiled_with(law, set()))
-    return hashlib.sha256(b'\0'.join(parts)).hexdigest()[:24]
 
 
 @cache
@@ -145,8 +134,13 @@ def named_for_its_code(
     processes that compile different variants at once cannot swap them. What the function calls
     must be defined before it, and it must not enclose compiled functions: those differ in every
     process, so that nothing would be found again. ``laws`` are the functions whose code makes it
-    another than others of its name, by default its own; ``variant`` is what else does.
+    another than others of its name, by default its own; ``variant`` is what else does. Compiled
+    code refers to the laws' modules by name, so those names count too: the module of a user's own
+    effect is named by its source.
     """
-    functions = [function] if laws is None else laws
-    function.__qualname__ = f'{function.__qualname__}-{identity(functions, *variant)}'
+    parts = [_code_around(), repr((numba.__version__, variant)).encode()]
+    for law in [function] if laws is None else laws:
+        parts.extend(_compiled_with(law, set()))
+    digest = hashlib.sha256(b'\0'.join(parts)).hexdigest()[:24]
+    function.__qualname__ = f'{function.__qualname__}-{digest}'
     return function

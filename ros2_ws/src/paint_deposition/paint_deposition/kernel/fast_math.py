@@ -64,19 +64,15 @@ def _exp(x):
     return lambda x: exp2(min(x * log2_e, highest))
 
 
-def _exp2_terms(degree: int) -> list[float]:
-    """Polynomial of least relative error over -0.5 to 0.5, exactly 1 at 0: any power 0 is 1."""
-    x = 0.5 * np.cos(np.pi * (np.arange(4 * degree) + 0.5) / (4 * degree))
-    powers = np.arange(1, degree + 1)
-    columns = (2.0 * x[:, np.newaxis]) ** powers
-    relative = np.exp2(-x)
-    wanted = np.expm1(x * math.log(2.0))
-    fit = np.linalg.lstsq(columns * relative[:, np.newaxis], wanted * relative, rcond=None)[0]
-    return [1.0, *(fit * 2.0**powers).tolist()]
-
-
 def _exp2_of(real, integer, mantissa_bits, floor, degree):
-    polynomial = _horner([real(term) for term in _exp2_terms(degree)])
+    # Polynomial of least relative error over -0.5 to 0.5, exactly 1 at 0: any power 0 is 1.
+    places = 0.5 * np.cos(np.pi * (np.arange(4 * degree) + 0.5) / (4 * degree))
+    powers = np.arange(1, degree + 1)
+    columns = (2.0 * places[:, np.newaxis]) ** powers
+    relative = np.exp2(-places)
+    wanted = np.expm1(places * math.log(2.0))
+    fit = np.linalg.lstsq(columns * relative[:, np.newaxis], wanted * relative, rcond=None)[0]
+    polynomial = _horner([real(1.0), *map(real, (fit * 2.0**powers).tolist())])
     lowest, shift = real(floor), integer(mantissa_bits)
     # Adding this number leaves the nearest integer in the lowest bits of the mantissa.
     round_off = real(1.5 * 2.0**mantissa_bits)

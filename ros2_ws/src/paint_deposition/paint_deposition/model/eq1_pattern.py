@@ -130,10 +130,11 @@ class PlanarPattern(BaseModel):
         # g1 stays below twice its outer Gaussian, f below 1 + K3.
         ring = 2.0 * (1.0 - self.K2) * (1.0 + self.K3) / self.gamma_m2
         centre = self.K2 / (2.0 * math.pi * self.sigma2_m**2)
-        return max(
-            self.r_m + self.sigma1_m * _deviations(ring / limit),
-            self.sigma2_m * _deviations(centre / limit),
+        # Within so many standard deviations each Gaussian falls to the limit.
+        of_ring, of_centre = (
+            math.sqrt(2.0 * math.log(max(peak / limit, 1.0))) for peak in (ring, centre)
         )
+        return max(self.r_m + self.sigma1_m * of_ring, self.sigma2_m * of_centre)
 
     def enclosed_fraction(self, radius_m: ArrayLike) -> np.ndarray:
         """Share of the volume within a radius on the model plane [1]; arrays broadcast.
@@ -163,11 +164,6 @@ def _peak_flux_um_per_s(planar: PlanarPattern) -> float:
     towards = planar.phi_rad + 0.5 * math.pi
     rho = np.linspace(0.0, planar.r_m, 129) + 1e-6
     return float(planar.flux_um_per_s(rho * math.cos(towards), rho * math.sin(towards)).max())
-
-
-def _deviations(ratio: float) -> float:
-    """Standard deviations within which a Gaussian falls by this ratio."""
-    return math.sqrt(2.0 * math.log(max(ratio, 1.0)))
 
 
 # Messages carry the number in 32 bits.

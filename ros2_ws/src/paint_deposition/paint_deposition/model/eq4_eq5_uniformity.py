@@ -64,24 +64,20 @@ class ParallelPasses:
         found = np.empty(len(index_m))
         for count in np.unique(points).tolist():
             rows = points == count
-            film = self._films_um(index_m[rows], period[rows], count)
+            every_m = period[rows]
+            x = every_m[:, np.newaxis] * np.arange(count) / count
+            film = np.zeros(x.shape)
+            for collapse, row in self._rows(1.0):
+                start, reach = row * index_m[rows], collapse.reach_m
+                lowest = math.floor(np.min((-start - reach) / every_m))
+                highest = math.ceil(np.max((every_m - start + reach) / every_m))
+                lines = start + np.arange(lowest, highest + 1)[:, np.newaxis] * every_m
+                away = x - lines[:, :, np.newaxis]
+                laid = np.where(np.abs(away) <= reach, collapse.thickness_um(away), 0.0)
+                # One pass after the other: passes out of reach change no bit.
+                film += laid.sum(axis=0)
             found[rows] = film.std(axis=1) / film.mean(axis=1)
         return found
-
-    def _films_um(self, index_m: np.ndarray, period_m: np.ndarray, points: int) -> np.ndarray:
-        """(N, points) film [um] over one period of each index."""
-        x = period_m[:, np.newaxis] * np.arange(points) / points
-        film = np.zeros(x.shape)
-        for collapse, row in self._rows(1.0):
-            start, reach = row * index_m, collapse.reach_m
-            lowest = math.floor(np.min((-start - reach) / period_m))
-            highest = math.ceil(np.max((period_m - start + reach) / period_m))
-            lines = start + np.arange(lowest, highest + 1)[:, np.newaxis] * period_m
-            away = x - lines[:, :, np.newaxis]
-            laid = np.where(np.abs(away) <= reach, collapse.thickness_um(away), 0.0)
-            # One pass after the other: passes out of reach change no bit.
-            film += laid.sum(axis=0)
-        return film
 
     def _rows(self, index_m: float) -> list[tuple[Collapse, float]]:
         if self.alike:

@@ -9,7 +9,6 @@ from itertools import pairwise
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion import strokes
@@ -22,8 +21,6 @@ from paint_deposition.motion.trajectory import (
     FlowSchedule,
     PoseCounts,
     Trajectory,
-    first_trigger,
-    follow_trigger,
     gap_ns,
 )
 
@@ -38,7 +35,8 @@ class PathBuilder:
     followed as after a gap. A time between poses longer than ``max_pose_gap_s`` is gun off; the
     spray travels ``max_step_m`` at most in a sub-step. With ``whole_strokes`` a stroke is handed
     out when it is complete, with what lies ahead of each sub-step known. ``knows_all_changes``:
-    the changes of the trigger come before the poses, and hold for each restarted stream.
+    the changes of the trigger come before the poses, and hold for each restarted stream. Of
+    ``screen`` are the counts of poses and the newest that was kept.
     """
 
     def __init__(
@@ -52,7 +50,7 @@ class PathBuilder:
         self.max_gap_ns = gap_ns(max_pose_gap_s)
         self.max_step_m = max_step_m
         self.whole_strokes = whole_strokes
-        self._screen = PoseScreen(self.max_gap_ns)
+        self.screen = PoseScreen(self.max_gap_ns)
         self._flow = FlowSchedule()
         self._waiting: list[PoseBatch] = []
         self._integrated_ns: int | None = None
@@ -65,16 +63,6 @@ class PathBuilder:
         # First stamp of the stream.
         self._stream_ns: int | None = None
 
-    @property
-    def counts(self) -> PoseCounts:
-        """What became of the poses."""
-        return self._screen.counts
-
-    @property
-    def newest_ns(self) -> int | None:
-        """Stamp of the newest pose that was kept."""
-        return self._screen.newest_ns
-
     def add_trigger(self, stamp_ns: int, flow: float, brush: int = ONLY_BRUSH) -> None:
         """Change the flow (relative; 0 is gun off) and the brush at a time.
 
@@ -83,20 +71,18 @@ class PathBuilder:
         from before the newest pose by more than a gap waits as long, and the path with it: it is
         a late one if the stream goes on, and one of the restarted stream if that comes.
         """
-        newest_ns = int(stamp_ns) if self.newest_ns is None else self.newest_ns
+        newest_ns = self.screen.newest_ns
+        newest_ns = int(stamp_ns) if newest_ns is None else newest_ns
         waits = newest_ns - int(stamp_ns) > self.max_gap_ns
         if waits:
             self._restart_until_ns = newest_ns + self.max_gap_ns
         elif self._integrated_ns is not None:
-            self.counts.late_triggers += int(stamp_ns) < self._integrated_ns
+            self.screen.counts.late_triggers += int(stamp_ns) < self._integrated_ns
         self._flow.add(stamp_ns, flow, brush, another_stream=waits)
 
-    def add_poses(
-        self, stamps_ns: ArrayLike, positions_m: ArrayLike, quaternions_xyzw: ArrayLike
-    ) -> None:
-        """Take poses: (N,) int64, (N, 3) [m], (N, 4) scalar last."""
-        batch = PoseBatch.of(stamps_ns, positions_m, quaternions_xyzw)
-        continued, *restarted = self._screen.take(batch)
+    def add_poses(self, batch: PoseBatch) -> None:
+        """Take poses."""
+        continued, *restarted = self.screen.take(batch)
         self._waiting.append(continued)
         if self._stream_ns is None and len(continued):
             self._stream_ns = int(continued.stamps_ns[0])
@@ -104,7 +90,9 @@ class PathBuilder:
             # The stream has not restarted: changes that waited for that are of this one.
             waited = self._flow.go_on()
             if self._integrated_ns is not None:
-                self.counts.late_triggers += sum(stamp < self._integrated_ns for stamp in waited)
+                self.screen.counts.late_triggers += sum(
+                    stamp < self._integrated_ns for stamp in waited
+                )
         for stream in restarted:
             ended_ns = int(PoseBatch.joined(self._waiting).stamps_ns[-1])
             within = self._stream_ns is not None and stream.stamps_ns[0] > self._stream_ns
@@ -124,7 +112,7 @@ class PathBuilder:
         """
         # Of a restart that was about to come nothing is left, nor of its changes, which wait on.
         if finish:
-            self._screen.finish()
+            self.screen.finish()
         self._cut_segments(until_ns, finish)
         if self._integrated_ns is not None:
             self._flow.forget(self._integrated_ns)
@@ -187,9 +175,8 @@ class PathBuilder:
     def _with_strokes_and_passes(self, path: SprayPath, after_gap: np.ndarray) -> SprayPath:
         """The path with its strokes and passes, and what lies behind each sub-step."""
         if self._states is None:
-            flow_before = 0.0 if self._flow else 1.0
-            of_pass = strokes.first_pass(flow_before)
-            self._states = strokes.first_stroke(), of_pass, first_trigger(flow_before)
+            flow_before = float(self._flow.steps()[1][0])
+            self._states = strokes.first_states(flow_before)
             after_gap[0] = False  # Nothing came before the first.
         of_stroke, of_pass, of_trigger = self._states
         position, normal = path.position_m, path.rotation[:, :, 2]
@@ -199,7 +186,7 @@ class PathBuilder:
         spray_pass = strokes.follow_passes(
             of_pass, position, normal, heading, step, path.flow, after_gap
         )
-        open_flow, open_brush, since_on, since_off = follow_trigger(
+        open_flow, open_brush, since_on, since_off = strokes.follow_trigger(
             of_trigger, path.dwell_s, path.flow, path.brush, after_gap
         )
         if self._began_ns is None:
@@ -225,8 +212,8 @@ def spray_path(
         if isinstance(event, TriggerChange):
             builder.add_trigger(event.stamp_ns, event.flow, event.brush)
         else:
-            builder.add_poses(*vars(event).values())
-    return builder.take(finish=True), builder.counts
+            builder.add_poses(event)
+    return builder.take(finish=True), builder.screen.counts
 
 
 def checked_path(
@@ -241,7 +228,20 @@ def checked_path(
     if not len(path):
         _refuse_motion(trajectory, counts, max_pose_gap_s)
     if not np.any(path.flow > 0.0):
-        _refuse_trigger(trajectory)
+        opened = trajectory.trigger_flow > 0.0
+        remedy = 'check --state-topic; without a trigger the gun sprays whenever poses flow'
+        if not np.any(opened):
+            raise RecordingError(
+                f'{trajectory.source}: the gun never sprays, none of the {len(opened)} messages '
+                f'of its trigger opens it; {remedy}'
+            )
+        opened_ns = trajectory.trigger_stamps_ns[np.argmax(opened)]
+        apart_s = 1e-9 * float(opened_ns - trajectory.stamps_ns.min())
+        raise RecordingError(
+            f'{trajectory.source}: the gun never sprays while there are poses, its trigger first '
+            f'opens {abs(apart_s):.3g} s {"after" if apart_s > 0.0 else "before"} the first of '
+            f'them: check that both are stamped by one clock; {remedy}'
+        )
     odd = list(interruptions(path, max_pose_gap_s))
     if counts.repeated_stamps > MANY_REPEATED * counts.received:
         odd.append(
@@ -320,20 +320,4 @@ def _refuse_motion(trajectory: Trajectory, counts: PoseCounts, max_pose_gap_s: f
     raise RecordingError(
         f'{trajectory.source}: no two of its {counts.received} poses make a motion'
         f'{f" ({found})" if found else ""}; {remedy}'
-    )
-
-
-def _refuse_trigger(trajectory: Trajectory) -> NoReturn:
-    stamps_ns, flow = trajectory.trigger_stamps_ns, trajectory.trigger_flow
-    remedy = 'check --state-topic; without a trigger the gun sprays whenever poses flow'
-    if not np.any(flow > 0.0):
-        raise RecordingError(
-            f'{trajectory.source}: the gun never sprays, none of the {len(flow)} messages of its '
-            f'trigger opens it; {remedy}'
-        )
-    apart_s = 1e-9 * float(stamps_ns[np.argmax(flow > 0.0)] - trajectory.stamps_ns.min())
-    raise RecordingError(
-        f'{trajectory.source}: the gun never sprays while there are poses, its trigger first '
-        f'opens {abs(apart_s):.3g} s {"after" if apart_s > 0.0 else "before"} the first of them: '
-        f'check that both are stamped by one clock; {remedy}'
     )

@@ -108,16 +108,12 @@ class MotionLog:
 
     def __init__(self, pose_memory: int = DEFAULT_POSE_MEMORY) -> None:
         self.pose_memory = pose_memory
-        self.poses = 0
+        self.poses = self.changes = 0
         self.complete = True
         # With room for more than came.
         self._kept = NO_POSES
         # With the number of poses that came before.
         self._changes: list[tuple[int, TriggerChange]] = []
-
-    @property
-    def changes(self) -> int:
-        return len(self._changes)
 
     def add(self, event: TriggerChange | PoseBatch) -> None:
         """Note what came."""
@@ -126,9 +122,10 @@ class MotionLog:
         size = 1 if isinstance(event, TriggerChange) else len(event)
         if self.poses + self.changes + size > self.pose_memory:
             self.complete = False
-            self._kept, self._changes = NO_POSES, []
+            self._kept, self._changes, self.changes = NO_POSES, [], 0
         elif isinstance(event, TriggerChange):
             self._changes.append((self.poses, event))
+            self.changes += 1
             return
         else:
             end = self.poses + len(event)
@@ -220,11 +217,10 @@ class PoseScreen:
         self._behind = poses.select(behind)
         return [poses.select(rows) for rows in streams]
 
-    def finish(self) -> int:
-        """The stream has ended: what still waits is dropped; the number of these poses."""
-        dropped, self._behind = len(self._behind), NO_POSES
-        self.counts.backward_stamps += dropped
-        return dropped
+    def finish(self) -> None:
+        """The stream has ended: what still waits is dropped."""
+        self.counts.backward_stamps += len(self._behind)
+        self._behind = NO_POSES
 
     def _rotations(self, poses: PoseBatch) -> PoseBatch:
         quaternions = poses.quaternions_xyzw

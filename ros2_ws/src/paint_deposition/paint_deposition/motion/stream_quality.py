@@ -17,24 +17,32 @@ LONGEST_REPEAT_NS = 50_000_000
 LEAST_SHARE = 0.2
 
 
-class Intervals:
-    """Intervals between the stamps of poses received in order, the longest, and how many are long.
+class StreamSteps:
+    """Steps from pose to pose of a stream, in the order in which they were received.
 
-    Long are more than 1.5 times the median of those before: with a steady stream, lost poses.
+    Attributes:
+        longest_ns: longest interval between two stamps.
+        long: intervals of more than 1.5 times the median of those before: with a steady stream,
+            lost poses.
+        jumps: steps that no robot makes: two guns on one topic, or stamps of two clocks.
+        fastest_m_per_s: speed that the worst of these would take, 0 where there is none.
     """
 
     def __init__(self) -> None:
-        self.longest_ns = 0
-        self.long = 0
+        self.longest_ns = self.long = self.jumps = 0
+        self.fastest_m_per_s = 0.0
         self._last_ns: int | None = None
         self._recent: deque[int] = deque(maxlen=REMEMBERED)
+        # Of the last pose with a place.
+        self._placed_ns: np.ndarray = np.empty(0, dtype=np.int64)
+        self._placed_m: np.ndarray = np.empty((0, 3))
 
     @property
     def typical_ns(self) -> float:
         """Median of the last intervals; 0 before there are any."""
         return float(np.median(self._recent)) if self._recent else 0.0
 
-    def add(self, stamps_ns: np.ndarray) -> None:
+    def add_stamps(self, stamps_ns: np.ndarray) -> None:
         """Take stamps (N,) int64; a stamp that does not move forward begins anew."""
         typical_ns = self.typical_ns
         for stamp_ns in stamps_ns.tolist():
@@ -46,30 +54,17 @@ class Intervals:
                 self.long += step_ns > 1.5 * typical_ns
                 self._recent.append(step_ns)
 
-
-class Jumps:
-    """Steps that no robot makes: two guns on one topic, or stamps of two clocks.
-
-    Their count, and the speed that the worst of them would take, 0 where there is none.
-    """
-
-    def __init__(self) -> None:
-        self.count = 0
-        self.fastest_m_per_s = 0.0
-        self._last_ns: np.ndarray = np.empty(0, dtype=np.int64)
-        self._last_m: np.ndarray = np.empty((0, 3))
-
-    def add(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
-        """Take stamps (N,) int64 and positions (N, 3) [m]; a stamp that goes back begins anew."""
-        stamps_ns = np.concatenate([self._last_ns, stamps_ns])
-        positions_m = np.concatenate([self._last_m, positions_m])
-        self._last_ns, self._last_m = stamps_ns[-1:], positions_m[-1:]
+    def add_places(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
+        """Take finite positions (N, 3) [m] at stamps (N,) int64; going back begins anew."""
+        stamps_ns = np.concatenate([self._placed_ns, stamps_ns])
+        positions_m = np.concatenate([self._placed_m, positions_m])
+        self._placed_ns, self._placed_m = stamps_ns[-1:], positions_m[-1:]
         step_s = np.diff(stamps_ns) * 1e-9
         step_m = np.linalg.norm(np.diff(positions_m, axis=0), axis=1)
         # Painting robots move their TCP at 3 m/s at most; stamps that tremble make any step of a
         # slow gun of less than 50 mm look fast.
         far = (step_s > 0.0) & (step_m > np.fmax(0.05, 10.0 * step_s))
-        self.count += int(np.count_nonzero(far))
+        self.jumps += int(np.count_nonzero(far))
         fastest = step_m[far] / step_s[far]
         self.fastest_m_per_s = float(np.max(fastest, initial=self.fastest_m_per_s))
 

@@ -1,4 +1,4 @@
-"""Strokes and passes, numbered over the sub-steps of a path.
+"""Strokes and passes, numbered over the sub-steps of a path, and the time since the gun switched.
 
 Strokes are the straight or gently curved stretches between the turns of the tool path.
 
@@ -43,6 +43,7 @@ import numpy as np
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.fast_math import cross, difference, dot, length
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 # The path's heading is judged over this travel, so that jitter at rest is no turn [m].
 HEADING_STEP_M = 0.01
@@ -87,31 +88,23 @@ def take_in(heading, step_m, length_m, mean, carried):
         carried[k] += gain * (heading[k] - carried[k])
 
 
-def first_stroke() -> np.ndarray:
-    """State before the first sub-step: (1,) record."""
+def first_states(flow_before: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(1,) states of stroke, pass and trigger before the first sub-step, by the flow before."""
     # anchor and earlier are where the last two heading steps began, with the path since then: a
     # turn that shows now lies behind the earlier one.
     lengths = ('from_turn_m', 'length_m', 'since_anchor_m', 'since_earlier_m')
     vectors = ('position', 'normal', 'anchor', 'earlier', 'heading', 'mean', 'carried')
     fields = [('number', 'i8'), *((name, 'f8') for name in lengths)]
-    state = np.zeros(1, np.dtype([*fields, *((name, 'f8', 3) for name in vectors)]))
-    state['number'] = -1
-    return state
-
-
-@njit
-def _advance(state, position):
-    """Follow the path to its next position; length of the heading step that ends here, or 0."""
-    travel = length(difference(position, state.position))
-    state.since_anchor_m += travel
-    state.since_earlier_m += travel
-    step = difference(position, state.anchor)
-    step_m = length(step)
-    for k in range(3):
-        state.position[k] = position[k]
-        if step_m >= HEADING_STEP_M:
-            state.heading[k] = step[k] / step_m
-    return step_m if step_m >= HEADING_STEP_M else 0.0
+    of_stroke = np.zeros(1, np.dtype([*fields, *((name, 'f8', 3) for name in vectors)]))
+    places = ('position', 'normal', 'mean', 'carried', 'closed_at')
+    fields = [('number', 'i8'), ('state', 'i8'), ('length_m', 'f8'), ('flow', 'f8')]
+    of_pass = np.zeros(1, np.dtype([*fields, *((name, 'f8', 3) for name in places)]))
+    of_stroke['number'] = of_pass['number'] = -1
+    of_pass['flow'] = flow_before
+    numbers = ('flow', 'open_flow', 'dwell_s', 'since_on_s', 'since_off_s')
+    fields = [*((name, 'f8') for name in numbers), ('open_brush', 'i8')]
+    first = flow_before, 1.0, 0.0, np.inf, np.inf, ONLY_BRUSH
+    return of_stroke, of_pass, np.array([first], np.dtype(fields))
 
 
 @njit
@@ -165,8 +158,18 @@ def follow_strokes(states, position, normal, velocity, dwell, after_gap):
                 state.anchor[k] = state.earlier[k] = state.position[k] = position[i, k]
                 state.heading[k] = state.mean[k] = state.carried[k] = 0.0
         else:
-            step[i] = _advance(state, position[i])
-            if step[i] > 0.0 and _take_step(state, step[i]):
+            travel = length(difference(position[i], state.position))
+            state.since_anchor_m += travel
+            state.since_earlier_m += travel
+            way = difference(position[i], state.anchor)
+            way_m = length(way)
+            is_step = way_m >= HEADING_STEP_M
+            for k in range(3):
+                state.position[k] = position[i, k]
+                if is_step:
+                    state.heading[k] = way[k] / way_m
+            step[i] = way_m if is_step else 0.0
+            if is_step and _take_step(state, way_m):
                 state.from_turn_m -= half_step
         stroke[i], from_turn[i] = state.number, state.from_turn_m + half_step
         state.from_turn_m += 2.0 * half_step
@@ -208,16 +211,6 @@ def look_ahead(stroke, velocity, dwell, flow, since_on, from_turn):
 AWAITED, RUNS, ENDED = 0, 1, 2
 
 
-def first_pass(flow_before: float) -> np.ndarray:
-    """State before the first sub-step: (1,) record, from the flow that was on until then."""
-    vectors = ('position', 'normal', 'mean', 'carried', 'closed_at')
-    numbers = [('number', 'i8'), ('state', 'i8'), ('length_m', 'f8'), ('flow', 'f8')]
-    state = np.zeros(1, np.dtype([*numbers, *((name, 'f8', 3) for name in vectors)]))
-    state['number'] = -1
-    state['flow'] = flow_before
-    return state
-
-
 @njit
 def _end(state):
     state.state = ENDED
@@ -230,8 +223,15 @@ def _end(state):
 @njit
 def _spray(state, heading):
     """Begin a pass here, where the gun is open, if none runs and this is no link."""
-    if state.state == RUNS and state.flow == 0.0 and _on_another_track(state):
-        _end(state)
+    if state.state == RUNS and state.flow == 0.0:
+        # The way from where it closed, seen along the tool axis.
+        x, y, z = difference(state.position, state.closed_at)
+        off = dot((x, y, z), state.normal)
+        way = x - off * state.normal[0], y - off * state.normal[1], z - off * state.normal[2]
+        # A gun that opens more than 30 degrees off the line on which it closed is on another
+        # track.
+        if dot(way, way) >= HEADING_STEP_M**2 and cosine(way, state.carried) < math.sqrt(0.75):
+            _end(state)
     if state.state == RUNS:
         return
     if dot(heading, heading) == 0.0:
@@ -244,18 +244,6 @@ def _spray(state, heading):
         state.state = RUNS
         state.length_m = 0.0
         take_in(heading, 1.0, 1.0, state.mean, state.carried)
-
-
-@njit
-def _on_another_track(state):
-    """Whether the gun has left the line on which it closed, seen along the tool axis."""
-    x, y, z = difference(state.position, state.closed_at)
-    off = dot((x, y, z), state.normal)
-    between = x - off * state.normal[0], y - off * state.normal[1], z - off * state.normal[2]
-    if dot(between, between) < HEADING_STEP_M**2:
-        return False
-    # A gun that opens more than 30 degrees off the line on which it closed is on another track.
-    return cosine(between, state.carried) < math.sqrt(0.75)
 
 
 @njit(cache=True)
@@ -289,3 +277,37 @@ def follow_passes(states, position, normal, heading, step, flow, after_gap):
             _spray(state, heading[i])
         spray_pass[i], state.flow = state.number, flow[i]
     return spray_pass
+
+
+@njit(cache=True)
+def follow_trigger(states, dwell, flow, brush, after_gap):
+    """Measure back to the last opening and closing of the gun; a gap forgets them.
+
+    ``states`` (1,) is updated in place; all others (M,): dwell [s], relative flow, 0 gun off,
+    int64 brush, which counts where the gun is on, and after_gap.
+
+    Returns:
+        open_flow and open_brush (M,) of the opening that runs or ran last; since_on_s and
+        since_off_s (M,) to the middle of the sub-step, inf where there is nothing to measure to.
+    """
+    count = len(dwell)
+    open_flow, since_on, since_off = np.empty(count), np.empty(count), np.empty(count)
+    open_brush = np.empty(count, np.int64)
+    state = states[0]
+    for i in range(count):
+        if after_gap[i]:
+            state.flow = 0.0
+            state.since_on_s = state.since_off_s = np.inf
+        elapsed = 0.5 * (state.dwell_s + dwell[i])
+        state.since_on_s += elapsed
+        state.since_off_s += elapsed
+        if flow[i] > 0.0 and state.flow == 0.0:
+            state.since_on_s = 0.5 * dwell[i]
+        if flow[i] == 0.0 and state.flow > 0.0:
+            state.since_off_s = 0.5 * dwell[i]
+        if flow[i] > 0.0:
+            state.open_flow, state.open_brush = flow[i], brush[i]
+        state.flow, state.dwell_s = flow[i], dwell[i]
+        open_flow[i], open_brush[i] = state.open_flow, state.open_brush
+        since_on[i], since_off[i] = state.since_on_s, state.since_off_s
+    return open_flow, open_brush, since_on, since_off

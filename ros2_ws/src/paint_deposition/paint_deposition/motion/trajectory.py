@@ -9,7 +9,6 @@ from operator import itemgetter
 import numpy as np
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.kernel.compiler import njit
 
 # The brush of a motion that names none: the only one.
 ONLY_BRUSH = 0
@@ -36,47 +35,6 @@ def relative_flow(spraying: bool, flow: float = math.nan) -> float:
     return float(flow)
 
 
-def first_trigger(flow_before: float) -> np.ndarray:
-    """State before the first sub-step: (1,) record, from the flow that was on until then."""
-    numbers = ('flow', 'open_flow', 'dwell_s', 'since_on_s', 'since_off_s')
-    fields = [*((name, 'f8') for name in numbers), ('open_brush', 'i8')]
-    return np.array([(flow_before, 1.0, 0.0, np.inf, np.inf, ONLY_BRUSH)], np.dtype(fields))
-
-
-@njit(cache=True)
-def follow_trigger(states, dwell, flow, brush, after_gap):
-    """Measure back to the last opening and closing of the gun; a gap forgets them.
-
-    ``states`` (1,) is updated in place; all others (M,): dwell [s], relative flow, 0 gun off,
-    int64 brush, which counts where the gun is on, and after_gap.
-
-    Returns:
-        open_flow and open_brush (M,) of the opening that runs or ran last; since_on_s and
-        since_off_s (M,) to the middle of the sub-step, inf where there is nothing to measure to.
-    """
-    count = len(dwell)
-    open_flow, since_on, since_off = np.empty(count), np.empty(count), np.empty(count)
-    open_brush = np.empty(count, np.int64)
-    state = states[0]
-    for i in range(count):
-        if after_gap[i]:
-            state.flow = 0.0
-            state.since_on_s = state.since_off_s = np.inf
-        elapsed = 0.5 * (state.dwell_s + dwell[i])
-        state.since_on_s += elapsed
-        state.since_off_s += elapsed
-        if flow[i] > 0.0 and state.flow == 0.0:
-            state.since_on_s = 0.5 * dwell[i]
-        if flow[i] == 0.0 and state.flow > 0.0:
-            state.since_off_s = 0.5 * dwell[i]
-        if flow[i] > 0.0:
-            state.open_flow, state.open_brush = flow[i], brush[i]
-        state.flow, state.dwell_s = flow[i], dwell[i]
-        open_flow[i], open_brush[i] = state.open_flow, state.open_brush
-        since_on[i], since_off[i] = state.since_on_s, state.since_off_s
-    return open_flow, open_brush, since_on, since_off
-
-
 _STAMP = itemgetter(0)
 
 
@@ -89,9 +47,6 @@ class FlowSchedule:
     def __init__(self) -> None:
         self._changes: list[tuple[int, float, int]] = []
         self._of_another_stream: list[tuple[int, float, int]] = []
-
-    def __bool__(self) -> bool:
-        return bool(self._changes)
 
     def add(
         self, stamp_ns: int, flow: float, brush: int = ONLY_BRUSH, another_stream: bool = False

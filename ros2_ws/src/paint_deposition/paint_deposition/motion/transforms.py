@@ -8,7 +8,6 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from itertools import pairwise
 from operator import itemgetter, matmul
 from typing import Any
 
@@ -147,6 +146,8 @@ class FrameTree:
         # Parent and pose of a frame that does not move; of these, where the user says that it is.
         self._fixed: dict[str, tuple[str, Rigid]] = {}
         self._placed: dict[str, tuple[str, Rigid]] = {}
+        # Both, the user's in the place of the others.
+        self._still: dict[str, tuple[str, Rigid]] = {}
         # Stamp, parent and pose of each frame over time, in order; and of a live one that the
         # last transform was far behind.
         self._moving: dict[str, list[tuple[int, str, np.ndarray]]] = {}
@@ -166,6 +167,7 @@ class FrameTree:
         if self._has_room(child):
             self._lasting.clear()
             self._fixed[_name(child)] = _name(parent), Rigid.of(pose)
+            self._still = self._fixed | self._placed
 
     def place(self, child: str, parent: str, pose: Sequence[float]) -> None:
         """Say where a frame is, whatever transforms say of it; no pose: they say it again."""
@@ -173,6 +175,7 @@ class FrameTree:
         self._placed.pop(_name(child), None)
         if len(pose):
             self._placed[_name(child)] = _name(parent), Rigid.of(pose)
+        self._still = self._fixed | self._placed
 
     def add(self, child: str, parent: str, stamp_ns: int, pose: Sequence[float]) -> bool:
         """Take a transform at one time.
@@ -213,10 +216,6 @@ class FrameTree:
         """Parent and pose of a frame that does not move, None if it does or is not known."""
         return self._still.get(_name(child))
 
-    @property
-    def _still(self) -> dict[str, tuple[str, Rigid]]:
-        return self._fixed | self._placed
-
     def newest_ns(self, child: str) -> int:
         """Stamp of the newest pose of a frame over time, 0 without any."""
         motion = self._moving.get(_name(child))
@@ -256,13 +255,6 @@ class FrameTree:
         except NoTransform:
             return None
         return {*up, *down} & self._moving.keys() - self._still.keys()
-
-    def connected(self, frame: str) -> list[str]:
-        """The other frames that a frame is connected with by fixed ones."""
-        return [
-            name for name in self.names
-            if name != _name(frame) and self.moving_between(frame, name) == set()
-        ]  # fmt: skip
 
     def lookup(self, source: str, target: str, stamp_ns: int = 0) -> Rigid:
         """The pose of frame `source` in `target` at that time, which brings poses from one to
@@ -315,10 +307,6 @@ class FrameTree:
         if not np.array_equal(before[3:], after[3:]):
             pose[3:] = quaternion_slerp(before[3:], after[3:], share, shortest_path=True)
         return Rigid.of(pose)
-
-    def longest_gap_s(self, child: str) -> float:
-        """Between two poses of a frame over time."""
-        return 1e-9 * max((b - a for a, b in pairwise(self.stamps_ns(child))), default=0)
 
 
 def _name(frame: str) -> str:

@@ -9,7 +9,6 @@ from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.fast_math import cross, difference, dot, length
 from paint_deposition.part.edges import (
     BLOCK,
-    Edges,
     connected,
     cut_segments,
     half_edges_m,
@@ -45,16 +44,16 @@ def folds_rad(vertices, faces, normals, paired):
 
 
 def rim_folds(
-    vertices_m: np.ndarray, faces: np.ndarray, edges: Edges, folds: np.ndarray
+    vertices_m: np.ndarray, faces: np.ndarray, paired: np.ndarray, folds: np.ndarray
 ) -> np.ndarray:
-    """(E,) bool: paired edges at which the surface ends by folding back, at once or in a hem.
+    """(E,) bool: ``paired`` edges at which the surface ends by folding back, at once or in a hem.
 
     A hem is a row of folds that together turn convexly by as much as a rim.
     """
     rim = folds >= RIM_FOLD_RAD
     rows = np.flatnonzero(folds > np.radians(4.0))  # less is no fold
-    ends_m = half_edges_m(vertices_m, faces, edges.paired[rows, 0])
-    beside = faces[edges.paired[rows] // 3].reshape(-1, 3)
+    ends_m = half_edges_m(vertices_m, faces, paired[rows, 0])
+    beside = faces[paired[rows] // 3].reshape(-1, 3)
     area = face_areas_m2(vertices_m, beside).reshape(-1, 2).min(axis=1)
     width_m = 2.0 * area / np.linalg.norm(ends_m[:, 1] - ends_m[:, 0], axis=1)
     # Folds that turn more slowly belong to a curved surface.
@@ -83,16 +82,14 @@ def rim_folds(
     return rim
 
 
-def split_at_creases(
-    faces: np.ndarray, edges: Edges, smooth: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Give each patch whose paired edges are all ``smooth`` (E,) its own vertices.
+def split_at_creases(faces: np.ndarray, smooth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Give each patch within which all paired edges are smooth, (S, 2), its own vertices.
 
     Returned are (W,) the vertex each new vertex is a copy of, and (F, 3) faces on the new
     vertices.
     """
     # The corners at both ends of smooth edges hang together.
-    one, other = edges.paired[smooth].T
+    one, other = smooth.T
     starts = np.stack([one, next_half_edge(other)], axis=1)
     ends = np.stack([next_half_edge(one), other], axis=1)
     count, label = connected(np.concatenate([starts, ends]), faces.size)
@@ -155,19 +152,16 @@ class CurvedEdges:
     lengths_m: np.ndarray  # (E,) of the edges as they were read [m]
     turns_rad: np.ndarray  # (E,) by which the normals turn along the edge [rad]
 
-    def __len__(self) -> int:
-        return len(self.lengths_m)
-
     def off_at(self, positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How far the curve is from the mesh at points on it, and by how much the normals turn.
 
         What an edge's middle has fades toward its ends: at corners both are right. (P, 3) each, to
         be added to positions [m] and normals.
         """
-        if not len(self):
+        if not len(self.middles_m):
             return np.zeros_like(positions_m), np.zeros_like(positions_m)
         # A point within a triangle lies near the middles of its sides, and of few others.
-        near = min(8, len(self))
+        near = min(8, len(self.middles_m))
         away_m, edge = scipy.spatial.cKDTree(self.middles_m).query(positions_m, range(1, near + 1))
         fading = np.clip(1.0 - (2.0 * away_m / self.lengths_m[edge]) ** 2, 0.0, None) ** 2
         off_m, turns = self.curved_m - self.middles_m, self.curved_normals - self.normals

@@ -37,23 +37,6 @@ def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return normals
 
 
-@njit(cache=True, nogil=True, error_model='numpy')
-@named_for_its_code
-def _mean_normal(vertices, faces, corners, out):
-    out[:] = 0.0
-    for c in corners:
-        f, k = c // 3, c % 3
-        here = vertices[faces[f, k]]
-        ahead = difference(vertices[faces[f, (k + 1) % 3]], here)
-        behind = difference(vertices[faces[f, (k + 2) % 3]], here)
-        across = cross(ahead, behind)
-        size = length(across)
-        angle = math.atan2(size, dot(ahead, behind))
-        for axis in range(3):
-            out[axis] += angle * (across[axis] / size)
-    out /= max(length(out), 1e-12)
-
-
 @njit(cache=True, nogil=True)
 def _gather(faces, first, corner, v, seen, passed, near):
     """Put v and the vertices up to two edges from it into ``near``; return how many."""
@@ -155,7 +138,17 @@ def _fill(vertices, faces, first, corner, normals, start, stop):
     system, work = np.empty((UNKNOWNS, UNKNOWNS + 1)), np.empty((UNKNOWNS, 2 * UNKNOWNS + 1))
     for v in range(start, stop):
         normal = normals[v]
-        _mean_normal(vertices, faces, corner[first[v] : first[v + 1]], normal)
+        normal[:] = 0.0
+        for c in corner[first[v] : first[v + 1]]:
+            f, k = c // 3, c % 3
+            ahead = difference(vertices[faces[f, (k + 1) % 3]], vertices[v])
+            behind = difference(vertices[faces[f, (k + 2) % 3]], vertices[v])
+            spanned = cross(ahead, behind)
+            size = length(spanned)
+            angle = math.atan2(size, dot(ahead, behind))
+            for axis in range(3):
+                normal[axis] += angle * (spanned[axis] / size)
+        normal /= max(length(normal), 1e-12)
         count = _gather(faces, first, corner, v, seen, passed, near)
         one, other = _equations(vertices, v, normal, near[:count], system)
         along, across, condition = _solved(system, work)

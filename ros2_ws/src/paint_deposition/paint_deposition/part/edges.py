@@ -4,7 +4,6 @@ Half-edge h = 3 f + k runs from corner k of triangle f to its next corner.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -67,26 +66,19 @@ def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return edges, of_half_edge.reshape(-1, 3)
 
 
-@dataclass(frozen=True)
-class Edges:
-    """Which half-edges lie on each other."""
+def matched_half_edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which half-edges of (F, 3) faces lie on each other.
 
-    # (E, 2) of two triangles with the same winding, in the order of their vertices.
-    paired: np.ndarray
-    clashing: np.ndarray  # (C, 2) of two triangles of opposite winding
-    single: np.ndarray  # (B,) those without a partner, or with several
-
-    @staticmethod
-    def of(faces: np.ndarray) -> 'Edges':
-        """Match the edges of (F, 3) faces."""
-        order, first = half_edges_by_edge(faces)
-        count = np.diff(first)
-        two = first[:-1][count == 2]
-        pairs = np.stack([order[two], order[two + 1]], axis=1)
-        corners = faces.ravel()
-        opposed = corners[pairs[:, 0]] != corners[pairs[:, 1]]
-        single = np.sort(order[np.repeat(count != 2, count)])
-        return Edges(pairs[opposed], pairs[~opposed], single)
+    (E, 2) of two triangles with the same winding, in the order of their vertices; (C, 2) of two
+    of opposite winding, which clash; and (B,) those without a partner, or with several.
+    """
+    order, first = half_edges_by_edge(faces)
+    count = np.diff(first)
+    two = first[:-1][count == 2]
+    pairs = np.stack([order[two], order[two + 1]], axis=1)
+    corners = faces.ravel()
+    opposed = corners[pairs[:, 0]] != corners[pairs[:, 1]]
+    return pairs[opposed], pairs[~opposed], np.sort(order[np.repeat(count != 2, count)])
 
 
 def next_half_edge(half_edges: np.ndarray) -> np.ndarray:
@@ -100,17 +92,13 @@ def half_edges_m(vertices_m: np.ndarray, faces: np.ndarray, half_edges: np.ndarr
     return vertices_m[np.stack([corners[half_edges], corners[next_half_edge(half_edges)]], axis=1)]
 
 
-def connected(rows: np.ndarray, count: int) -> tuple[int, np.ndarray]:
+@njit(cache=True, nogil=True)
+def connected(rows, count):
     """How many groups of ``count`` members rows (P, K) make, and (count,) the group of each.
 
     Members in one row, the ends of an edge or the corners of a face, are of one group. Groups are
     numbered in the order of their first members.
     """
-    return _connected(np.ascontiguousarray(rows, dtype=np.int64), count)
-
-
-@njit(cache=True, nogil=True)
-def _connected(rows, count):
     # Members hang from the first of all that they are joined to.
     parents = np.arange(count).astype(np.int32)
     for row in rows:

@@ -1,6 +1,5 @@
 """From the triangles of a file to a conforming mesh of bounded edge length."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -10,123 +9,28 @@ from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.fast_math import cross, difference, length
 from paint_deposition.part.edges import edges_of
 
-
-@dataclass(frozen=True)
-class CutEdges:
-    """Edges cut into equal parts, 2 to some power, so that halving them meets the same points."""
-
-    parts: np.ndarray  # (E,) how many; 1 is uncut
-    first: np.ndarray  # (E,) number of the inner vertex next to the edge's first end
-
-    def along(self, edge: np.ndarray, forward: np.ndarray, parts: int) -> np.ndarray:
-        """(N, parts - 1) inner vertices of edges of that many parts, ``forward`` or not."""
-        steps = np.arange(parts - 1)
-        return self.first[edge][:, None] + np.where(forward[:, None], steps, parts - 2 - steps)
-
-    def middles(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Ends (lower, upper) and middle of the cut edges, their halves, and so on."""
-        lower, upper, middle = [], [], []
-        for parts in np.unique(self.parts[self.parts > 1]).tolist():
-            cut = np.flatnonzero(self.parts == parts)
-            inner = self.first[cut][:, None] + np.arange(parts - 1)
-            points = np.concatenate([edges[cut, :1], inner, edges[cut, 1:]], axis=1)
-            span = parts
-            while span > 1:
-                ends = points[:, ::span]
-                one, other = ends[:, :-1].ravel(), ends[:, 1:].ravel()
-                lower.append(np.minimum(one, other))
-                upper.append(np.maximum(one, other))
-                middle.append(points[:, span // 2 :: span].ravel())
-                span //= 2
-        return np.concatenate(lower), np.concatenate(upper), np.concatenate(middle)
-
-
-def cut_edges(
-    of_slivers: np.ndarray, lengths_m: np.ndarray, max_edge_length_m: float, next_vertex: int
-) -> CutEdges:
-    """Cut the long sides of slivers, (N, 3) edges of (E,) lengths, into pieces as their base.
-
-    No piece need be shorter than the longest edge; the first new vertex is ``next_vertex``.
-    """
-    in_order = np.take_along_axis(of_slivers, lengths_m[of_slivers].argsort(axis=1), axis=1)
-    piece_m = np.maximum(lengths_m[in_order[:, :1]], max_edge_length_m)
-    sides = in_order[:, 1:]
-    parts = np.ones(len(lengths_m), dtype=np.int64)
-    wanted = 2 ** np.ceil(np.log2(lengths_m[sides] / piece_m)).astype(np.int64)
-    np.maximum.at(parts, sides, wanted)
-    return CutEdges(parts, next_vertex + np.cumsum(parts - 1) - (parts - 1))
-
-
-def cut_slivers(
-    slivers: np.ndarray, of_slivers: np.ndarray, lengths_m: np.ndarray, cut: CutEdges
-) -> np.ndarray:
-    """Pieces (P, 3) of slivers (N, 3) whose sides (N, 3) are edges of lengths_m (E,)."""
-    base = lengths_m[of_slivers].argmin(axis=1)
-    # From the tip opposite the base, with the same winding.
-    turn = (base[:, None] + np.array([2, 0, 1])) % 3
-    rows = np.arange(len(slivers))[:, None]
-    tip, left, right = slivers[rows, turn].T
-    sides = of_slivers[rows, turn]
-    left_edge, right_edge = sides[:, 0], sides[:, 2]
-    counts = np.stack([cut.parts[left_edge], cut.parts[right_edge]], axis=1)
-    pieces = []
-    for parts in np.unique(counts, axis=0):
-        some = (counts == parts).all(axis=1)
-        a, b, c = tip[some], left[some], right[some]
-        up = cut.along(left_edge[some], a < b, int(parts[0]))
-        down = cut.along(right_edge[some], a < c, int(parts[1]))
-        vertices = np.concatenate([a[:, None], up, b[:, None], down, c[:, None]], axis=1)
-        pieces.append(vertices[:, _ladder(*parts.tolist())].reshape(-1, 3))
-    return np.concatenate(pieces)
-
-
-@lru_cache
-def _ladder(left_parts: int, right_parts: int) -> np.ndarray:
-    """(T, 3) triangles between two sides from one tip: vertices tip, left ones, right ones."""
-    left = np.arange(left_parts + 1)
-    right = np.concatenate([[0], left_parts + 1 + np.arange(right_parts)])
-    i, j = 1, 1
-    triangles = [(left[0], left[1], right[1])]
-    while i < left_parts or j < right_parts:
-        if i < left_parts and (i + 1) * right_parts <= (j + 1) * left_parts:
-            triangles.append((left[i], left[i + 1], right[j]))
-            i += 1
-        else:
-            triangles.append((left[i], right[j + 1], right[j]))
-            j += 1
-    return np.array(triangles)
-
-
 MAX_TRIANGLES = 5_000_000
 KEY_BASE = np.int64(1) << 31
 
 
 def face_areas_m2(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F,) areas [m^2]."""
-    return _areas_and_normals(_double(vertices_m), faces)[0]
+    return _areas_and_normals(vertices_m, faces)[0]
 
 
 def face_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) unit normals by the right-hand rule."""
-    return _areas_and_normals(_double(vertices_m), faces)[1]
-
-
-def edge_lengths_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(F, 3) lengths of the edges from each corner to the next [m]."""
-    return _edge_lengths(_double(vertices_m), faces)
-
-
-def _double(vertices_m: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(vertices_m, dtype=np.float64)
+    return _areas_and_normals(vertices_m, faces)[1]
 
 
 @njit(cache=True, nogil=True)
 @named_for_its_code
-def _edge_lengths(vertices, faces):
+def edge_lengths_m(vertices_m, faces):
+    """(F, 3) lengths of the edges from each corner to the next [m]."""
     lengths = np.empty(faces.shape)
     for f in range(len(faces)):
         for k in range(3):
-            a, b = vertices[faces[f, k]], vertices[faces[f, (k + 1) % 3]]
+            a, b = vertices_m[faces[f, k]], vertices_m[faces[f, (k + 1) % 3]]
             lengths[f, k] = length(difference(b, a))
     return lengths
 
@@ -177,14 +81,13 @@ def refine(
         base_m, side_m, _ = np.sort(length_m[of_face], axis=1).T
         thin = np.flatnonzero(side_m > np.maximum(3.0 * base_m, max_edge_length_m))
         if in_step and len(thin):
-            cut = cut_edges(of_face[thin], length_m, max_edge_length_m, len(mesh.vertices_m))
-            pieces = cut_slivers(faces[thin], of_face[thin], length_m, cut)
-            mesh.add_cuts(edges, cut)
+            parts = _parts(of_face[thin], length_m, max_edge_length_m)
+            first = mesh.add_cuts(edges, parts)
+            pieces = _cut_slivers(faces[thin], of_face[thin], length_m, parts, first)
             faces = np.concatenate([np.delete(faces, thin, axis=0), pieces])
             continue
-        longest = _longest(length_m, of_face)
         halved = too_long | (known >= 0)
-        _close_under_longest(halved, of_face, longest)
+        longest = _close_under_longest(halved, length_m, of_face)
         middle = mesh.add_middles(edges, halved, known)
         faces = _split(mesh.vertices_m, faces, middle[of_face], longest)
 
@@ -217,15 +120,33 @@ class _Growing:
             self._remember(edges[new, 0], edges[new, 1], middle[new])
         return middle
 
-    def add_cuts(self, edges: np.ndarray, cut: CutEdges) -> None:
-        """Add the inner vertices of cut edges."""
-        edge = np.repeat(np.arange(len(edges)), cut.parts - 1)
-        step = np.arange(len(edge)) - np.repeat(
-            np.cumsum(cut.parts - 1) - cut.parts, cut.parts - 1
-        )
-        self._append(edges[edge], (step / cut.parts[edge])[:, None])
+    def add_cuts(self, edges: np.ndarray, parts: np.ndarray) -> np.ndarray:
+        """Add the inner vertices of edges cut into equal parts, (E,) powers of two, 1 is uncut.
+
+        The middles of the edges, of their halves, and so on are known from now on. Returned is
+        (E,) the number of the inner vertex next to each edge's first end.
+        """
+        before = np.cumsum(parts - 1) - (parts - 1)
+        edge = np.repeat(np.arange(len(edges)), parts - 1)
+        step = np.arange(len(edge)) - np.repeat(before - 1, parts - 1)
+        first = len(self.vertices_m) + before
+        self._append(edges[edge], (step / parts[edge])[:, None])
         self._keys = self._middles = np.empty(0, dtype=np.int64)
-        self._remember(*cut.middles(edges))
+        lower, upper, middle = [], [], []
+        for count in np.unique(parts[parts > 1]).tolist():
+            cut = np.flatnonzero(parts == count)
+            inner = first[cut][:, None] + np.arange(count - 1)
+            points = np.concatenate([edges[cut, :1], inner, edges[cut, 1:]], axis=1)
+            span = count
+            while span > 1:
+                ends = points[:, ::span]
+                one, other = ends[:, :-1].ravel(), ends[:, 1:].ravel()
+                lower.append(np.minimum(one, other))
+                upper.append(np.maximum(one, other))
+                middle.append(points[:, span // 2 :: span].ravel())
+                span //= 2
+        self._remember(*map(np.concatenate, (lower, upper, middle)))
+        return first
 
     def _remember(self, lower: np.ndarray, upper: np.ndarray, middle: np.ndarray) -> None:
         keys = np.concatenate([self._keys, lower * KEY_BASE + upper])
@@ -241,9 +162,77 @@ class _Growing:
         self.normals = np.concatenate([self.normals, between])
 
 
+def _parts(of_slivers: np.ndarray, lengths_m: np.ndarray, max_edge_length_m: float) -> np.ndarray:
+    """(E,) into how many parts edges are cut: those that are long sides of slivers (N, 3).
+
+    Their pieces are as long as the base, though not shorter than the longest edge need be.
+    """
+    in_order = np.take_along_axis(of_slivers, lengths_m[of_slivers].argsort(axis=1), axis=1)
+    piece_m = np.maximum(lengths_m[in_order[:, :1]], max_edge_length_m)
+    sides = in_order[:, 1:]
+    parts = np.ones(len(lengths_m), dtype=np.int64)
+    # A power of two, so that halving the edges meets the same points.
+    wanted = 2 ** np.ceil(np.log2(lengths_m[sides] / piece_m)).astype(np.int64)
+    np.maximum.at(parts, sides, wanted)
+    return parts
+
+
+def _cut_slivers(
+    slivers: np.ndarray,
+    of_slivers: np.ndarray,
+    lengths_m: np.ndarray,
+    parts: np.ndarray,
+    first: np.ndarray,
+) -> np.ndarray:
+    """Pieces (P, 3) of slivers (N, 3) whose sides (N, 3) are edges of lengths_m (E,).
+
+    ``parts`` and ``first`` (E,) are as for ``_Growing.add_cuts``.
+    """
+    base = lengths_m[of_slivers].argmin(axis=1)
+    # From the tip opposite the base, with the same winding.
+    turn = (base[:, None] + np.array([2, 0, 1])) % 3
+    rows = np.arange(len(slivers))[:, None]
+    corners = slivers[rows, turn]
+    sides = of_slivers[rows, turn][:, [0, 2]]  # left and right of the tip
+    counts = parts[sides]
+    pieces = []
+    for both in np.unique(counts, axis=0):
+        some = (counts == both).all(axis=1)
+        tip, *ends = corners[some].T
+        vertices = [tip[:, None]]
+        for end, edge, count in zip(ends, sides[some].T, both.tolist(), strict=True):
+            steps = np.arange(count - 1)
+            inner = np.where((tip < end)[:, None], steps, count - 2 - steps)
+            vertices += [first[edge][:, None] + inner, end[:, None]]
+        ladder = _ladder(*both.tolist())
+        pieces.append(np.concatenate(vertices, axis=1)[:, ladder].reshape(-1, 3))
+    return np.concatenate(pieces)
+
+
+@lru_cache
+def _ladder(left_parts: int, right_parts: int) -> np.ndarray:
+    """(T, 3) triangles between two sides from one tip: vertices tip, left ones, right ones."""
+    left = np.arange(left_parts + 1)
+    right = np.concatenate([[0], left_parts + 1 + np.arange(right_parts)])
+    i, j = 1, 1
+    triangles = [(left[0], left[1], right[1])]
+    while i < left_parts or j < right_parts:
+        if i < left_parts and (i + 1) * right_parts <= (j + 1) * left_parts:
+            triangles.append((left[i], left[i + 1], right[j]))
+            i += 1
+        else:
+            triangles.append((left[i], right[j + 1], right[j]))
+            j += 1
+    return np.array(triangles)
+
+
 @njit(cache=True, nogil=True)
-def _longest(length_m, of_face):
-    """(F,) 0 to 2, the longest edge; of equal ones that of higher number: neighbours agree."""
+def _close_under_longest(halved, length_m, of_face):
+    """Add to the (E,) edges to halve the longest of every triangle that is touched.
+
+    Returned is (F,) 0 to 2, the longest edge; of equal ones that of higher number: neighbours
+    agree.
+    """
     longest = np.zeros(len(of_face), dtype=np.int64)
     for f in range(len(of_face)):
         for k in (1, 2):
@@ -251,12 +240,6 @@ def _longest(length_m, of_face):
             longer = length_m[other] > length_m[best]
             if longer or (length_m[other] == length_m[best] and other > best):
                 longest[f] = k
-    return longest
-
-
-@njit(cache=True, nogil=True)
-def _close_under_longest(halved, of_face, longest):
-    """Add to the (E,) edges to halve the longest of every triangle that is touched."""
     changed = True
     while changed:
         changed = False
@@ -266,6 +249,7 @@ def _close_under_longest(halved, of_face, longest):
                 halved[of_face[f, 0]] or halved[of_face[f, 1]] or halved[of_face[f, 2]]
             ):
                 halved[own] = changed = True
+    return longest
 
 
 def _split(

@@ -15,7 +15,12 @@ from paint_deposition.kernel.blocks import (
 )
 from paint_deposition.part import creases, derivatives
 from paint_deposition.part.creases import NO_EDGES, CurvedEdges
-from paint_deposition.part.edges import Edges, edge_distance_m, half_edges_m, without_seams
+from paint_deposition.part.edges import (
+    edge_distance_m,
+    half_edges_m,
+    matched_half_edges,
+    without_seams,
+)
 from paint_deposition.part.face_tree import FaceTree, Location, first_hits, locate
 from paint_deposition.part.points import (
     CANCELLED,
@@ -93,22 +98,22 @@ class Surface:
         """
         vertices_m = np.ascontiguousarray(vertices_m, dtype=np.float64)
         faces = np.ascontiguousarray(faces, dtype=np.int64)
-        edges = Edges.of(faces)
-        folds = creases.folds_rad(vertices_m, faces, face_normals(vertices_m, faces), edges.paired)
-        rim = creases.rim_folds(vertices_m, faces, edges, folds)
+        paired, clashing, single = matched_half_edges(faces)
+        folds = creases.folds_rad(vertices_m, faces, face_normals(vertices_m, faces), paired)
+        rim = creases.rim_folds(vertices_m, faces, paired, folds)
         smooth = (np.abs(folds) <= creases.CREASE_RAD) & ~rim
-        origin, patches = creases.split_at_creases(faces, edges, smooth)
+        origin, patches = creases.split_at_creases(faces, paired[smooth])
         # Where the surface ends, and where it folds back.
-        single_m = half_edges_m(vertices_m, faces, edges.single)
-        folded_m = half_edges_m(vertices_m, faces, edges.paired[rim, 0])
+        single_m = half_edges_m(vertices_m, faces, single)
+        folded_m = half_edges_m(vertices_m, faces, paired[rim, 0])
         rim_m = np.concatenate([without_seams(single_m), folded_m])
-        strip = creases.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
+        strip = creases.strip_vertices(vertices_m[origin], patches, paired[rim].ravel())
         corners = vertices_m[origin]
         read_normals = derivatives.surface_normals(corners, patches)
-        unjoined = edges.paired[~smooth, 1], edges.clashing.ravel(), edges.single
-        half_edges = np.concatenate([edges.paired[:, 0], *unjoined])
+        unjoined = paired[~smooth, 1], clashing.ravel(), single
+        half_edges = np.concatenate([paired[:, 0], *unjoined])
         curved_edges = CurvedEdges.of(corners, read_normals, patches, half_edges)
-        del edges, folds, half_edges  # large ones, before the next are made
+        del paired, folds, half_edges, unjoined  # large ones, before the next are made
         vertices, normals, fine = refine(corners, read_normals, patches, max_edge_length_m)
         areas = np.repeat(face_areas_m2(vertices, fine) / 3.0, 3)
         vertex_areas = np.bincount(fine.ravel(), areas, minlength=len(vertices))
@@ -263,23 +268,9 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
     for positions_m, z_axes in motions:
         front, back, axes = facing(surface, positions_m, z_axes)
         if len(axes):
-            return _settled(surface, front, back, axes)
-    return surface
-
-
-def turned(surface: Surface) -> Surface:
-    """The part with its other side outward."""
-    edges = surface.curved_edges
-    return replace(
-        surface,
-        faces=np.ascontiguousarray(surface.faces[:, ::-1]),
-        normals=-surface.normals,
-        curved_edges=replace(edges, normals=-edges.normals, curved_normals=-edges.curved_normals),
-    )
-
-
-def _settled(surface: Surface, front: int, back: int, axes: np.ndarray) -> Surface:
-    """The part with the side outward that these poses look at."""
+            break
+    else:
+        return surface
     if back > front:
         note = (
             f'{back} of {back + front} poses look at the back of the mesh: its '
@@ -298,6 +289,17 @@ def _settled(surface: Surface, front: int, back: int, axes: np.ndarray) -> Surfa
     vars(known).update({key: value for key, value in made if key in ('_tree', 'occluder')})
     settled = surface.gun_side is not None and np.array_equal(known.outward, surface.outward)
     return surface if settled else known
+
+
+def turned(surface: Surface) -> Surface:
+    """The part with its other side outward."""
+    edges = surface.curved_edges
+    return replace(
+        surface,
+        faces=np.ascontiguousarray(surface.faces[:, ::-1]),
+        normals=-surface.normals,
+        curved_edges=replace(edges, normals=-edges.normals, curved_normals=-edges.curved_normals),
+    )
 
 
 def facing(

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from functools import cached_property, partial
+from functools import partial
 from threading import Lock
 
 import numpy as np
@@ -126,24 +126,24 @@ class Occluder:
     def __init__(self, tree: Callable[[], FaceTree]) -> None:
         self._tree = tree
         self._building = Lock()
-        self._built: tuple[EmbreeScene, TriangleMesh] | None = None
-
-    @cached_property
-    def _origin_m(self) -> np.ndarray:
-        """Embree works in single precision: coordinates are kept small."""
-        return box_centre_m(self._tree().vertices_m)
+        self._built: tuple[EmbreeScene, np.ndarray, TriangleMesh] | None = None
 
     @property
-    def _scene(self) -> EmbreeScene:
-        """Made with the first ray, for all threads: it takes a second for a million triangles."""
+    def _scene(self) -> tuple[EmbreeScene, np.ndarray]:
+        """The scene, and the point (3,) that its coordinates are relative to [m].
+
+        Made with the first ray, for all threads: it takes a second for a million triangles.
+        """
         with self._building:
             if self._built is None:
-                scene = EmbreeScene(robust=True)
-                corners = (self._tree().vertices_m - self._origin_m).astype(np.float32)
+                scene, tree = EmbreeScene(robust=True), self._tree()
+                # Embree works in single precision: coordinates are kept small.
+                origin_m = box_centre_m(tree.vertices_m)
+                corners = (tree.vertices_m - origin_m).astype(np.float32)
                 # The scene does not keep the mesh alive by itself.
-                faces = self._tree().faces.astype(np.int32)
-                self._built = scene, TriangleMesh(scene, corners, faces)
-            return self._built[0]
+                mesh = TriangleMesh(scene, corners, tree.faces.astype(np.int32))
+                self._built = scene, origin_m, mesh
+            return self._built[:2]
 
     def sees(self, eyes_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
         """(...,) bool: whether nothing of the part lies between (..., 3) eyes and points on it.
@@ -181,7 +181,13 @@ class Occluder:
         1 on flat and convex surface. The fixed set of SKY_RAYS directions resolves 0.002 where
         only the lowest sky is hidden, as in the shallow recesses of a door.
         """
-        sky, weights = _sky()
+        # Directions (3, SKY_RAYS) about +z. The sky below elevation e has weight sin(e)^2; with
+        # t = sin(e) in equal strata rays lie close together near the horizon, where they are
+        # needed. Strata are shifted from azimuth to azimuth.
+        azimuth, stratum = np.divmod(np.arange(SKY_RAYS), ELEVATIONS)
+        t = (stratum + 0.5 * (np.sqrt(5.0) - 1.0) * azimuth % 1.0) / ELEVATIONS
+        angle, across = 2.0 * np.pi * (azimuth + 0.5) / AZIMUTHS, np.sqrt(1.0 - t**2)
+        sky, weights = np.stack([across * np.cos(angle), across * np.sin(angle), t]), t / t.sum()
         horizon = self.horizon_sines(points_m, normals)
         open_share = np.empty(len(points_m))
         rows = 1_000_000 // SKY_RAYS
@@ -200,23 +206,11 @@ class Occluder:
     def _blocked(
         self, starts_m: np.ndarray, directions: np.ndarray, lengths_m: np.ndarray
     ) -> np.ndarray:
-        hits = self._scene.run(
-            (starts_m - self._origin_m).astype(np.float32),
+        scene, origin_m = self._scene
+        hits = scene.run(
+            (starts_m - origin_m).astype(np.float32),
             directions.astype(np.float32),
             dists=np.maximum(lengths_m, 0.0).astype(np.float32),
             query='OCCLUDED',
         )
         return hits >= 0
-
-
-def _sky() -> tuple[np.ndarray, np.ndarray]:
-    """(3, SKY_RAYS) directions about +z and their cosine weights (SKY_RAYS,), which sum to 1.
-
-    The sky below elevation e has weight sin(e)^2; with t = sin(e) in equal strata rays lie close
-    together near the horizon, where they are needed. Strata are shifted from azimuth to azimuth.
-    """
-    azimuth, stratum = np.divmod(np.arange(SKY_RAYS), ELEVATIONS)
-    t = (stratum + 0.5 * (np.sqrt(5.0) - 1.0) * azimuth % 1.0) / ELEVATIONS
-    angle = 2.0 * np.pi * (azimuth + 0.5) / AZIMUTHS
-    across = np.sqrt(1.0 - t**2)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), t]), t / t.sum()

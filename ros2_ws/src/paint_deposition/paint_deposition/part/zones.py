@@ -21,22 +21,6 @@ NONE = -1
 
 
 @dataclass(frozen=True)
-class Box:
-    """What lies between two corners in the frame of the mesh."""
-
-    box_m: np.ndarray  # (2, 3) lowest and highest corner [m]
-
-    def holds(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """(N,) bool, which points (N, 3) [m] with outward unit normals (N, 3) lie in it."""
-        low, high = self.box_m
-        return np.all((positions_m >= low) & (positions_m <= high), axis=1)
-
-    def facing(self, surface: Surface) -> Box:
-        """The box itself: it has no side."""
-        return self
-
-
-@dataclass(frozen=True)
 class Patch:
     """Triangles, and what lies over them."""
 
@@ -82,21 +66,23 @@ class Patch:
         return FaceTree.of(corners, faces), np.repeat(face_normals(corners, faces), 3, axis=0)
 
 
-Region = Box | Patch
-
-
 @dataclass(frozen=True)
 class Zone:
-    """Part of a part's surface, and the film wanted there."""
+    """Part of a part's surface, in a box, over a patch, or both; and the film wanted there."""
 
     name: str
     target_um: float  # film wanted [um]
     tolerance_um: float  # what it may differ either way [um]
-    regions: tuple[Region, ...]  # it is where all of them are
+    box_m: np.ndarray | None = None  # (2, 3) lowest and highest corner, as the mesh has them [m]
+    patch: Patch | None = None
 
     def holds(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N,) bool, which points (N, 3) [m] with outward unit normals (N, 3) lie in it."""
-        return np.logical_and.reduce([one.holds(positions_m, normals) for one in self.regions])
+        held = np.ones(len(positions_m), dtype=bool)
+        if self.box_m is not None:
+            low, high = self.box_m
+            held = np.all((positions_m >= low) & (positions_m <= high), axis=1)
+        return held & self.patch.holds(positions_m, normals) if self.patch else held
 
 
 @dataclass(frozen=True)
@@ -122,8 +108,7 @@ class Zones:
             PaintError: a zone has no vertex of the part; says why, and the remedy.
         """
         facing = [
-            replace(zone, regions=tuple(region.facing(surface) for region in zone.regions))
-            for zone in self.zones
+            replace(zone, patch=zone.patch and zone.patch.facing(surface)) for zone in self.zones
         ]
         zones = Zones(tuple(facing))
         found = PointZones(zones, zones.of(surface.vertices_m, surface.normals))
@@ -137,7 +122,8 @@ class Zones:
                     f"zone '{zone.name}': all {inside.sum()} vertices of the part in it belong to "
                     f'zones before it ({names}); put it before them'
                 )
-            boxes = ' and '.join(box_words(region.box_m) for region in zone.regions)
+            places_m = [zone.box_m, zone.patch.box_m if zone.patch else None]
+            boxes = ' and '.join(box_words(corners) for corners in places_m if corners is not None)
             raise PaintError(
                 f"zone '{zone.name}' holds no vertex of the part: it lies within {boxes}, the "
                 f'part within {box_words(surface.vertices_m)}; give it in the frame and unit of '

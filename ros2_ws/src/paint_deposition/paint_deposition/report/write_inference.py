@@ -174,9 +174,16 @@ def write_fitted(
         uncertainty.setdefault(section, {})[name] = float(f'{value.sigma:.3g}')
     fitted = _rounded(fit, steps[0].model.effects)
     few = {name: _short(getattr(posterior, name)) for name in ('mean', 'covariance')}
-    whole = fitted.with_missing_brushes(start.model)
+    fitted_numbers = {brush.number for brush in fitted.brushes}
+    others = [brush for brush in start.model.brushes if brush.number not in fitted_numbers]
+    whole = fitted
+    if others:
+        whole = DepositionModel(
+            brushes=(*fitted.brushes, *others), projection=fitted.projection,
+            effects=fitted.effects,
+        )  # fmt: skip
     # A posterior of some brushes only would be taken for that of all.
-    known = posterior.model_copy(update=few) if whole is fitted else None
+    known = None if others else posterior.model_copy(update=few)
     write_model(path, whole, header_comment, history, uncertainty, start.name, known)
 
 

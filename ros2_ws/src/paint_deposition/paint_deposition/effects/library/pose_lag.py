@@ -33,7 +33,10 @@ class PoseLag(Effect):
             level, brush = path.open_flow, path.brush
         else:
             gained_s, lost_s, side = path.until_on_s, path.until_off_s, 0.5
-            ahead = _opening_ahead(path)
+            # The next sub-step with the gun open; the last one where none comes.
+            ahead, opens = np.arange(len(path)), np.flatnonzero(on)
+            if len(opens):
+                ahead = opens[np.minimum(np.searchsorted(opens, ahead), len(opens) - 1)]
             level, brush = path.flow[ahead], np.where(on, path.brush, path.brush[ahead])
         lag_s = abs(self.lag_s)
         gained = _share_within(gained_s, path.dwell_s, lag_s)
@@ -47,14 +50,6 @@ class PoseLag(Effect):
             brush=brush,
             position_m=path.position_m + shift_s[:, np.newaxis] * path.velocity_m_per_s,
         )
-
-
-def _opening_ahead(path: SprayPath) -> np.ndarray:
-    """(M,) row of the next sub-step with the gun open; of the last one where none comes."""
-    rows, on = np.arange(len(path)), np.flatnonzero(path.flow > 0.0)
-    if not len(on):
-        return rows
-    return on[np.minimum(np.searchsorted(on, rows), len(on) - 1)]
 
 
 def _share_within(middle_s: np.ndarray, dwell_s: np.ndarray, lag_s: float) -> np.ndarray:

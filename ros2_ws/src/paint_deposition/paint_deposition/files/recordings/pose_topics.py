@@ -152,7 +152,8 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
         )
     note = f"tf: pose of '{source}' in '{target}', {len(found)} poses"
     if more := len(moving) - 1:
-        longest_s = max(tree.longest_gap_s(edge.child) for edge in moving)
+        gaps_ns = [np.diff(np.unique(edge.stamps_ns)).max(initial=0) for edge in moving]
+        longest_s = 1e-9 * max(gaps_ns)
         note += f', {more} more transforms interpolated over up to {longest_s:.3g} s'
     poses = np.array([pose.values for pose in found])
     trajectory = Trajectory(

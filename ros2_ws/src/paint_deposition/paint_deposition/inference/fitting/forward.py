@@ -16,8 +16,7 @@ from paint_deposition.film.integrator import (
     FEW_RAYS,
     FilmIntegrator,
     Steps,
-    after_film_effects,
-    gauge_reading_um,
+    after_effects,
 )
 from paint_deposition.film.layout import term_weights
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
@@ -151,10 +150,10 @@ class _Part:
         """(P,) gauge readings [um] of what arrived."""
         points, films = self.points(stages.slope), self.experiment.films
         finished = (
-            (sign, after_film_effects(film_um, stages.finishing, points))
+            (sign, after_effects('on_film', film_um, stages.finishing, points))
             for (sign, _), film_um in zip(films, films_um.reshape(len(films), -1), strict=True)
         )
-        reading = gauge_reading_um(sum_um(finished), stages.finishing, points)
+        reading = after_effects('on_gauge', sum_um(finished), stages.finishing, points)
         return reading[: len(self.experiment)]
 
     def _integrated_um(self, model: DepositionModel, slope: bool) -> np.ndarray:

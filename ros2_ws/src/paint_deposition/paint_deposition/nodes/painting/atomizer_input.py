@@ -17,7 +17,7 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns, trigger_change
 from paint_deposition.motion.pose_stream import PoseBatch
-from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow
+from paint_deposition.motion.stream_quality import SpeedNow, StreamSteps
 from paint_deposition.motion.trajectory import SPRAYS_NOTHING
 from paint_deposition.motion.transforms import NoTransform
 from paint_deposition.nodes import topics
@@ -60,8 +60,8 @@ class AtomizerInput:
         times_s: (computing time, duration of the motion) of the last batches.
         anomalies: other poses and states with something wrong, counted by its description.
         state_errors: why states were refused, each reason once.
-        intervals, jumps: between stamps, and steps that no robot makes. These and all counts from
-            `refused_frames` on are since the last reset.
+        steps: from pose to pose. These and all counts from `refused_frames` on are since the last
+            reset.
     """
 
     def __init__(self, node: PaintingNode, number: int) -> None:
@@ -129,8 +129,7 @@ class AtomizerInput:
         self.unpainted = 0
         for topic in self._topics:
             topic.lost = 0
-        self.intervals = Intervals()
-        self.jumps = Jumps()
+        self.steps = StreamSteps()
 
     # --- holding
 
@@ -200,14 +199,14 @@ class AtomizerInput:
         self.newest_ns = int(stamps[-1])
         batch = PoseBatch(stamps, positions, quaternions)
         moved = batch.select(np.flatnonzero(batch.finite))
-        jumped = self.jumps.count
-        self.intervals.add(stamps)
+        jumped = self.steps.jumps
+        self.steps.add_stamps(stamps)
         if len(moved):
             self.speed.add(moved.stamps_ns, moved.positions_m)
-            self.jumps.add(moved.stamps_ns, moved.positions_m)
-        if self.jumps.count and not jumped:
+            self.steps.add_places(moved.stamps_ns, moved.positions_m)
+        if self.steps.jumps and not jumped:
             self._node.get_logger().error(
-                f'{self._pose_topic}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s '
+                f'{self._pose_topic}: the TCP would move at {self.steps.fastest_m_per_s:.0f} m/s '
                 'between two poses: do two guns publish here, or two clocks stamp the poses?'
             )
         if self._node.active:

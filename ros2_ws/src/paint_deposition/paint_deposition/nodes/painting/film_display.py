@@ -239,7 +239,7 @@ class FilmDisplay:
         node, message = self._node, self._stats
         refused = sum(source.refused_frames.total() for source in node.inputs)
         counts = node.film.counts
-        longest_s = max(source.intervals.longest_ns for source in node.inputs) * 1e-9
+        longest_s = max(source.steps.longest_ns for source in node.inputs) * 1e-9
         now = counts.received + refused, counts.rejected + refused, counts.gaps, longest_s
         if now != self._counts:
             self._counts = now

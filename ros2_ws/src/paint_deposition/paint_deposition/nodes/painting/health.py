@@ -53,7 +53,7 @@ def what_was_wrong(source: AtomizerInput, film: LiveFilm) -> dict[str, int]:
     """How often something was wrong with a gun's poses and states since the last reset."""
     return {
         **{words: getattr(film.counts, name) for name, (words, _) in COUNTS.items()},
-        'steps faster than a robot': source.jumps.count,
+        'steps faster than a robot': source.steps.jumps,
         **source.anomalies,
         LOST: source.messages_lost,
         REFUSED: source.refused_frames.total(),
@@ -63,7 +63,7 @@ def what_was_wrong(source: AtomizerInput, film: LiveFilm) -> dict[str, int]:
 def poses_status(node: PaintingNode, number: int) -> Status:
     """The status of a gun's poses and states since the last reset."""
     source, film = node.inputs[number], node.film.guns[number]
-    counts, rhythm_ns = film.counts, source.intervals.typical_ns
+    counts, rhythm_ns = film.counts, source.steps.typical_ns
     programmed, wrong = source.programmed_m_per_s, what_was_wrong(source, film)
     gun = 'off'
     if film.flow is None:
@@ -74,12 +74,12 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         'poses taken': counts.received,
         'poses refused': counts.rejected + wrong[REFUSED],
         **wrong,
-        'longest interval [s]': f'{source.intervals.longest_ns * 1e-9:.3f}',
-        'intervals over 1.5 times the usual one': source.intervals.long,
+        'longest interval [s]': f'{source.steps.longest_ns * 1e-9:.3f}',
+        'intervals over 1.5 times the usual one': source.steps.long,
         'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
         'speed [m/s]': f'{source.speed.m_per_s:.3f}',
         'programmed speed [m/s]': f'{programmed:.3f}' if programmed > 0.0 else 'unknown',
-        'fastest step [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
+        'fastest step [m/s]': f'{source.steps.fastest_m_per_s:.1f}',
         UNPAINTED: source.unpainted,
         'poses in the tf queue': len(source.tf_queue),
         'gun': gun,
@@ -151,7 +151,7 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
     }
     if node.model_problem:
         return Status(WARN, node.model_problem, values)
-    if not node.film.complete:
+    if not all(gun.log.complete for gun in guns):
         limit = f'over {node.values["pose_memory"]} poses (pose_memory)'
         return Status(WARN, f'{limit}: a new model paints from then on only', values)
     if factor > 0.8:

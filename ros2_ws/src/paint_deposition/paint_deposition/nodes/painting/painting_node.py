@@ -58,7 +58,8 @@ class Repainting:
     def _run(self) -> None:
         try:
             films = self._make()
-            films.warm_up()
+            for film in films.guns:
+                film.warm_up()
             repainted = zip(films.guns, self.logs, strict=True) if self.from_start else ()
             for film, log in repainted:
                 # The rest is for the thread of the executor, which must not be blocked.
@@ -153,7 +154,8 @@ class PaintingNode(ManagedNode, ABC):
         if values.get('zones_file'):
             zones = read_zones(values['zones_file'], mesh_file, values['mesh_scale']).on(surface)
         film = self._unpainted(surface, points, self.models)
-        film.warm_up()
+        for gun in film.guns:
+            gun.warm_up()
         facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # builds the tree for a gun's rays
         return surface, points, film, zones
 
@@ -207,7 +209,7 @@ class PaintingNode(ManagedNode, ABC):
             film = self._unpainted(surface, points, self.models)
         for new, old in zip(film.guns, self.film.guns, strict=True):
             new.trigger_latency_s = self.values['trigger_latency_s']
-            new.reset_keeping_trigger_of(old)
+            new.reset(keeping_trigger_of=old)
         for source in self.inputs:
             source.reset_counts()
         self.mesh_file, self.files_in_use = mesh_file, self._files
