@@ -89,8 +89,8 @@ class OnePart(BaseModel):
 
     mesh_scale: Number = given(
         1.0,
-        'Metres per unit of the mesh file; 0.001 for millimetres. glTF, 3MF and STEP name their '
-        'unit: leave it out there.', above=0.0,
+        'Metres per unit of the mesh file; 0.001 for millimetres. glTF and STEP name their unit: '
+        'leave it out there.', above=0.0,
     )  # fmt: skip
     body: Text | None = given(
         None, 'The one body to take of a mesh file with several; default: all as one part.'

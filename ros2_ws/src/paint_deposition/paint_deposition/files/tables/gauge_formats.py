@@ -90,7 +90,7 @@ LINES = {
         rf'\s*n\.?\s*=\s*(?P<number>\d+)\s+(?P<thickness>[\d.,]+|-+)\s*{UNIT}\s*', re.IGNORECASE
     ),
 }
-# The files of a folder, or of its zip, that are one table, one below the other.
+# The files of a folder that are one table, one below the other.
 FOLDERS = {'PosiTector batch': ('header.txt', 'readings.txt')}
 
 # Cells with which a gauge says that it has no reading.

@@ -31,7 +31,7 @@ from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered,
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
 
-SUFFIXES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods')
+SUFFIXES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls')
 # Names of columns, as `column_name` leaves them.
 TIME = ('time', 'timestamp', 'stamp', 'timefromstart', 'elapsed', 'zeit', 't')
 TRIGGER = ('spraying', 'trigger', 'gun', 'gunon', 'on', 'spray', 'sprayon', 'paint', 'painton')

@@ -5,8 +5,7 @@ import json
 import re
 import zipfile
 import zlib
-from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from io import BytesIO, StringIO
 from pathlib import Path
@@ -22,10 +21,9 @@ WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
 MOST_TABLE_MB = 500
 # The place of a cell, of a row, or of the end of the table.
 XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]*)(\d+)["\']')
-ODS_TABLE = '{urn:oasis:names:tc:opendocument:xmlns:table:1.0}'
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
-EXPECTED = 'give a table as CSV, TSV, TXT or JSON, or a workbook (.xlsx, .xls, .ods)'
+EXPECTED = 'give a table as CSV, TSV, TXT or JSON, or a workbook (.xlsx, .xls)'
 
 
 @dataclass(frozen=True)
@@ -58,8 +56,6 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
         raise refusal(f'{path}: no such file; {EXPECTED}') from None
     except OSError as error:
         raise refusal(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
-    except (zipfile.BadZipFile, zlib.error, RuntimeError, ValueError) as error:  # also encrypted
-        raise refusal(f'{path}: cannot be read as a zip ({error}); {EXPECTED}') from None
     try:
         if content.startswith(WORKBOOKS):
             return _sheets_of_workbook(content)
@@ -73,41 +69,24 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
 
 
 def _content(path: Path, refusal: type[PaintError]) -> bytes:
-    """What a file holds, or the files of a folder or a zip that are its one table."""
-    if path.is_dir():
-        files = {file.name: file for file in path.iterdir() if file.is_file()}
-        wanted = _table_in(files, path, refusal)
-        return b'\n'.join(read_file(files[name], refusal, MOST_TABLE_MB) for name in wanted)
-    content = read_file(path, refusal, MOST_TABLE_MB)
-    if not (content.startswith(WORKBOOKS[0]) and zipfile.is_zipfile(BytesIO(content))):
-        return content
-    with zipfile.ZipFile(BytesIO(content)) as package:
-        members = [name for name in package.namelist() if name[-1:] != '/']
-        alike = Counter(Path(name).name for name in members)
-        names = {n if alike[Path(n).name] > 1 else Path(n).name: n for n in members}
-        if {'[Content_Types].xml', 'content.xml'} & {*names}:
-            return content  # a workbook
-        require_small_package(package)
-        return b'\n'.join(package.read(names[name]) for name in _table_in(names, path, refusal))
-
-
-def _table_in(names: Collection[str], path: Path, refusal: type[PaintError]) -> Sequence[str]:
-    """The names of those that ``FOLDERS`` has, one below the other, else of the only file."""
-    for wanted in FOLDERS.values():
-        if {*wanted} <= {*names}:
-            return wanted
-    visible = sorted(name for name in names if not Path(name).name.startswith('.'))
-    if len(visible) != 1:
+    """What a file holds; of a folder the files that ``FOLDERS`` has, else its only one."""
+    if not path.is_dir():
+        return read_file(path, refusal, MOST_TABLE_MB)
+    names = {file.name for file in path.iterdir() if file.is_file()}
+    visible = sorted(name for name in names if not name.startswith('.'))
+    batch = (files for files in FOLDERS.values() if {*files} <= names)
+    wanted: Sequence[str] = next(batch, visible)
+    if wanted == visible and len(visible) != 1:
         raise refusal(f'{path} holds {some(visible, 6) or "no file"}; name the one with the table')
-    return visible
+    return b'\n'.join(read_file(path / name, refusal, MOST_TABLE_MB) for name in wanted)
 
 
 def is_gauge_file(path: Path) -> bool:
-    """Whether a path can be that of readings only: JSON, a zip, or a gauge's folder."""
+    """Whether a path can be that of readings only: JSON, or a gauge's folder."""
     if path.is_dir():
         names = {file.name for file in path.iterdir()}
         return any({*files} <= names for files in FOLDERS.values())
-    return path.suffix.lower() in ('.json', '.zip')
+    return path.suffix.lower() == '.json'
 
 
 def text_of(cell: Cell) -> str:
@@ -196,9 +175,7 @@ def _sheets_of_workbook(content: bytes) -> list[Sheet]:
 
 
 def _refuse_far_cells(content: bytes) -> None:
-    """Refuse a workbook whose sheets would fill the memory: by a stray cell far away in an .xlsx,
-    by cells that are said to repeat in an .ods.
-    """
+    """Refuse a workbook whose sheets would fill the memory, by a stray cell far away."""
     if not zipfile.is_zipfile(BytesIO(content)):
         return
     with zipfile.ZipFile(BytesIO(content)) as package:
@@ -212,33 +189,10 @@ def _refuse_far_cells(content: bytes) -> None:
                 widths = (sum(26**k * (c & 31) for k, c in enumerate(name)) for name in names)
                 rows = (int(row) if len(row) < 10 else 10**9 for _, row in places)
                 cells = max(cells, max(widths, default=0) * max(rows, default=0))
-            if name == 'content.xml':
-                cells = max(cells, _cells_of_open_document(package.read(name)))
+            if name == 'content.xml':  # cells of an .ods are said to repeat, any number of times
+                raise ValueError('a workbook (an .ods; save it as .xlsx)')
     if cells > 10_000_000:  # the reader keeps all up to the last one, some 30 bytes each
         raise ValueError('a workbook (delete what lies far outside the table)')
-
-
-def _cells_of_open_document(content: bytes) -> int:
-    """The cells up to the last that holds something, those that are said to repeat in full."""
-    from lxml import etree
-
-    cells = width = height = 0
-    try:
-        rows = etree.iterparse(
-            BytesIO(content), tag=f'{ODS_TABLE}table-row', resolve_entities=False
-        )
-        for _, row in rows:
-            at = last = 0
-            for cell in row:
-                at += int(cell.get(f'{ODS_TABLE}number-columns-repeated', 1))
-                last = at if len(cell) or len(cell.attrib) > 1 else last
-            height += int(row.get(f'{ODS_TABLE}number-rows-repeated', 1))
-            width = max(width, last)
-            cells = max(cells, width * height * bool(last))
-            row.clear()
-    except etree.XMLSyntaxError as error:
-        raise ValueError(f'a workbook ({error})') from None
-    return cells
 
 
 def _cell(value: object) -> Cell:
