@@ -49,8 +49,8 @@ def _run(
             lambda kind, name, line: print_all(kind, [f'{name}: {line}']), zones_file,
         )  # fmt: skip
         named = model_file or data.model_file
-        chosen = chosen_model(Path(named) if named else None, named=bool(model_file))
-        start = chosen.known if named else None
+        file, of_model = chosen_model(Path(named) if named else None, named=bool(model_file))
+        start = file if named else None
         known = {name: getattr(start, name, None) for name in begins_with}
         result = verb(data, progress=show, **known)
         show('writing')
@@ -62,7 +62,7 @@ def _run(
     for name, found in first.geometry.items() if first is result else ():
         said.append(f'{name}: {found.sentence}')
         warnings += (f'{name}: {line}' for line in found.warnings)
-    source = chosen.words if start else 'a 50 mm bell'
+    source = of_model if start else 'a 50 mm bell'
     begin = 'fitted to the campaign, from ' if fitted or start is None else ''
     results.print(said, words or begin + source, data.understood, warnings)
 

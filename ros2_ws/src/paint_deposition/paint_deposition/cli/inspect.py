@@ -285,7 +285,7 @@ def _gun_on_part(
     with Progress('inspect') as show:
         show('reading')
         recorded = pd.read_recording(path, **motion)
-        model = model_for(model_file, path).known.model
+        model = model_for(model_file, path)[0].model
         seen = pd.look_at(part.surface(), recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:
             from paint_deposition.report.plan_pictures import write_geometry_picture

@@ -130,7 +130,7 @@ def _replay(
     chosen = models_for(files, [run], [name for name, _ in guns], named=model_file is not None)
     show('refining the mesh')
     surface = part.surface(Path(mesh))
-    replay = Replay(surface, guns, [one.known.model for one in chosen], **given)
+    replay = Replay(surface, guns, [file.model for file, _ in chosen], **given)
     replay.scene.tell('about', text=f'{run.name} on {Path(mesh).name}')
     return replay
 

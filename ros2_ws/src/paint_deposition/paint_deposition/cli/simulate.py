@@ -102,19 +102,19 @@ def simulate_command(
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(
-            surface, motions, [one.known.model for one in chosen], names=names, coats=coats,
+            surface, motions, [file.model for file, _ in chosen], names=names, coats=coats,
             wet_on_wet=wet_on_wet, readings=readings, max_pose_gap_s=max_pose_gap_s, zones=zones,
             strict=source.strict, progress=show, **dict(band),
         )  # fmt: skip
         made_from = {
             **inputs(mesh_file=part.mesh, zones_file=part.zones_file),
             'trajectory': ', '.join(map(str, trajectories)),
-            'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
+            'model_file': ', '.join(dict.fromkeys(str(m.path) for m, _ in chosen if m.path)),
         }
         show('writing and drawing')
         results.write(film, made_from=made_from)
     notes = (*film.notes, *([readings.understood] if readings else []))
-    words = '; '.join(dict.fromkeys(model.words for model in chosen))
+    words = '; '.join(dict.fromkeys(of_model for _, of_model in chosen))
     results.print(_film_lines(film), words, notes, film.warnings)
 
 
@@ -288,22 +288,20 @@ def measure_command(
         surface = part.surface()
         warnings: tuple[str, ...] = ()
         if trajectory is None:
-            chosen = chosen_model(model_file, brush=brush)
-            recorded = pd.plan(
-                surface, chosen.known.model, progress=show, **dict(passes)
-            ).trajectory
+            file, of_model = chosen_model(model_file, brush=brush)
+            recorded = pd.plan(surface, file.model, progress=show, **dict(passes)).trajectory
         else:
-            chosen = model_for(model_file, trajectory)
+            file, of_model = model_for(model_file, trajectory)
             recorded = pd.read_recording(trajectory, **motion)
             warnings = recorded.warnings
         result = pd.choose_readings(
-            surface, recorded, chosen.known.model, posterior=chosen.known.posterior,
+            surface, recorded, file.model, posterior=file.posterior,
             max_pose_gap_s=max_pose_gap_s, progress=show, **dict(request),
         )  # fmt: skip
-        made_from = inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=chosen.path)
+        made_from = inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=file.path)
         show('writing and drawing')
         results.write(result, made_from=made_from, part_pose=motion['part_pose'])
-    results.print(_point_lines(result), chosen.words, result.surface.notes, warnings)
+    results.print(_point_lines(result), of_model, result.surface.notes, warnings)
 
 
 def _point_lines(result: pd.ChosenReadings) -> Iterator[str]:
