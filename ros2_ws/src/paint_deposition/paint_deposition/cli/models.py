@@ -42,7 +42,9 @@ def model_for(given: Path | None, motion: Path, named: bool = True) -> tuple[Mod
 
     ``named`` is as for ``chosen_model``. Warnings go to stderr.
     """
-    from paint_deposition.files.provenance import model_digest, model_of_plan, planned_model
+    from paint_deposition.files.effect_file import load_unnamed_effect_file
+    from paint_deposition.files.model_file import read_model_file
+    from paint_deposition.files.provenance import model_digest, planned_model
 
     planned = planned_model(motion)
     chosen = chosen_model(given, named=named)
@@ -55,8 +57,8 @@ def model_for(given: Path | None, motion: Path, named: bool = True) -> tuple[Mod
         if digest not in map(model_digest, alike):
             print_all('note', [f'{motion} was planned with another model ({digest[:12]})'])
         return chosen
-    file = model_of_plan(path, digest)
-    if file is None:
+    file = read_model_file(path, load_unnamed_effect_file) if path.is_file() else None
+    if file is None or model_digest(file.model) != digest:
         print_all('warning', [
             f'{motion} was planned with a model ({digest[:12]}) that is not in '
             f'{path}; give it with --model, or the film is another one than planned'

@@ -1,6 +1,6 @@
 """Tables of gauge readings and of measuring points: their rows, units and numbers."""
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
@@ -347,17 +347,6 @@ class ReadingTable(Table):
             )
 
 
-def _known(films: bool, layout: Layout) -> Callable[[list[Heading]], int]:
-    """What counts the quantities that headings name, 0 where a needed one is missing."""
-    needed = (('thickness',),) if films else (AXES, ON_FACE)
-
-    def known(headings: list[Heading]) -> int:
-        at = columns_of(headings, layout)
-        return len(at) if any({*names} <= {*at} for names in needed) else 0
-
-    return known
-
-
 def _rows_in(
     path: Path, films: bool, layout: Layout, wide: int
 ) -> tuple[Sheet, int | None, ReadingTable]:
@@ -366,7 +355,13 @@ def _rows_in(
     ``wide`` is the number of columns of a table without headings, 0 for one that has them. A
     second table under other headings is refused; the same headings again are passed over.
     """
-    known = _known(films, layout)
+    needed = (('thickness',),) if films else (AXES, ON_FACE)
+
+    def known(headings: list[Heading]) -> int:
+        """How many quantities headings name, 0 where a needed one is missing."""
+        at = columns_of(headings, layout)
+        return len(at) if any({*names} <= {*at} for names in needed) else 0
+
     several: dict[str, Any] = {} if films else {'several': 'save the one of the points by itself'}
     sheet, header = find_table(path, ReadingsError, known, layout.sheet, wide, **several)
     headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []

@@ -5,7 +5,7 @@ import json
 import re
 import zipfile
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from io import BytesIO, StringIO
 from pathlib import Path
@@ -48,10 +48,20 @@ class Sheet:
 def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
     """The sheets of a workbook, or a text once for each separator in it, by blanks and by lines.
 
-    A file that is neither raises ``refusal``.
+    Of a folder, the files that ``FOLDERS`` has, else its only one. A file that is neither raises
+    ``refusal``.
     """
+    files = [path]
+    if path.is_dir():
+        names = {file.name for file in path.iterdir() if file.is_file()}
+        visible = sorted(name for name in names if not name.startswith('.'))
+        batch = next((files for files in FOLDERS.values() if {*files} <= names), None)
+        if batch is None and len(visible) != 1:
+            named = some(visible, 6) or 'no file'
+            raise refusal(f'{path} holds {named}; name the one with the table')
+        files = [path / name for name in batch or visible]
     try:
-        content = _content(path, refusal)
+        content = b'\n'.join(read_file(file, refusal, MOST_TABLE_MB) for file in files)
     except FileNotFoundError:
         raise refusal(f'{path}: no such file; {EXPECTED}') from None
     except OSError as error:
@@ -66,19 +76,6 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
     except ValueError as error:
         reason = ' '.join(str(error).split())
         raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
-
-
-def _content(path: Path, refusal: type[PaintError]) -> bytes:
-    """What a file holds; of a folder the files that ``FOLDERS`` has, else its only one."""
-    if not path.is_dir():
-        return read_file(path, refusal, MOST_TABLE_MB)
-    names = {file.name for file in path.iterdir() if file.is_file()}
-    visible = sorted(name for name in names if not name.startswith('.'))
-    batch = (files for files in FOLDERS.values() if {*files} <= names)
-    wanted: Sequence[str] = next(batch, visible)
-    if wanted == visible and len(visible) != 1:
-        raise refusal(f'{path} holds {some(visible, 6) or "no file"}; name the one with the table')
-    return b'\n'.join(read_file(path / name, refusal, MOST_TABLE_MB) for name in wanted)
 
 
 def is_gauge_file(path: Path) -> bool:
@@ -160,10 +157,21 @@ def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
 
 
 def _sheets_of_workbook(content: bytes) -> list[Sheet]:
+    """The sheets, unless a stray cell far away, or cells said to repeat, would fill the memory."""
     from python_calamine import CalamineError, CalamineWorkbook
 
+    cells = 0
     try:
-        _refuse_far_cells(content)
+        if zipfile.is_zipfile(BytesIO(content)):
+            with zipfile.ZipFile(BytesIO(content)) as package:
+                require_small_package(package)
+                for name in package.namelist():
+                    if name == 'content.xml':
+                        raise ValueError('a workbook (an .ods; save it as .xlsx)')
+                    if name.startswith('xl/') and name.endswith('.xml'):
+                        cells = max(cells, _most_cells(package.read(name)))
+        if cells > 10_000_000:  # the reader keeps all up to the last one, some 30 bytes each
+            raise ValueError('a workbook (delete what lies far outside the table)')
         workbook = CalamineWorkbook.from_filelike(BytesIO(content))
         sheets = []
         for sheet in map(workbook.get_sheet_by_name, workbook.sheet_names):
@@ -174,25 +182,14 @@ def _sheets_of_workbook(content: bytes) -> list[Sheet]:
         raise ValueError(f'a workbook ({error})') from None
 
 
-def _refuse_far_cells(content: bytes) -> None:
-    """Refuse a workbook whose sheets would fill the memory, by a stray cell far away."""
-    if not zipfile.is_zipfile(BytesIO(content)):
-        return
-    with zipfile.ZipFile(BytesIO(content)) as package:
-        require_small_package(package)
-        cells = 0
-        for name in package.namelist():
-            if name.startswith('xl/') and name.endswith('.xml'):
-                places = set(XLSX_CELL.findall(package.read(name)))
-                # As many letters and digits as make any sheet too large.
-                names = (column[:7][::-1] for column, _ in places)
-                widths = (sum(26**k * (c & 31) for k, c in enumerate(name)) for name in names)
-                rows = (int(row) if len(row) < 10 else 10**9 for _, row in places)
-                cells = max(cells, max(widths, default=0) * max(rows, default=0))
-            if name == 'content.xml':  # cells of an .ods are said to repeat, any number of times
-                raise ValueError('a workbook (an .ods; save it as .xlsx)')
-    if cells > 10_000_000:  # the reader keeps all up to the last one, some 30 bytes each
-        raise ValueError('a workbook (delete what lies far outside the table)')
+def _most_cells(xml: bytes) -> int:
+    """The cells up to the last place that is named in a sheet of an .xlsx."""
+    places = set(XLSX_CELL.findall(xml))
+    # As many letters and digits as make any sheet too large.
+    names = (column[:7][::-1] for column, _ in places)
+    widths = (sum(26**k * (c & 31) for k, c in enumerate(name)) for name in names)
+    rows = (int(row) if len(row) < 10 else 10**9 for _, row in places)
+    return max(widths, default=0) * max(rows, default=0)
 
 
 def _cell(value: object) -> Cell:

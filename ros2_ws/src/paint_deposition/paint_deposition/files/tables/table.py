@@ -46,13 +46,6 @@ class Table:
         """A column as texts."""
         return [text_of(cell_at(row, column)) for row in self.rows]
 
-    def texts_with_points(self, column: int) -> list[str]:
-        """A column as texts, its numbers with a decimal point."""
-        if self.decimal != ',':
-            return self.texts(column)
-        each = self.texts(column)
-        return [t if self.number(t) is None else t.replace(',', '.') for t in each]
-
     def numbers(
         self, column: int, may_be_empty: bool = False, finite: bool = True, switch: bool = False
     ) -> np.ndarray:
