@@ -21,7 +21,7 @@ from paint_deposition.files.campaign_coats import (
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.tables.headings import length_of
+from paint_deposition.files.tables.headings import LENGTHS, unit_of
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import TOTAL
@@ -195,7 +195,7 @@ def _read_experiments(
         remark('warning', name, warning)
     points = None if entry.points is None else folder / entry.points
     layout = Layout(
-        entry.columns, {kind: length_of(unit) or 1.0 for kind, unit in entry.unit.items()},
+        entry.columns, {kind: LENGTHS[unit_of(unit)] for kind, unit in entry.unit.items()},
         {None: '', 'comma': ',', 'point': '.'}[entry.decimal], entry.sheet or '', entry.zero or '',
     )  # fmt: skip
     readings = read_readings(files['measurements'], points, layout, surface)

@@ -178,6 +178,8 @@ def problem_in_words(effect: type[Effect]) -> str | None:
             return problem
     if not effect.amplitudes():
         return 'has no amplitude; declare one with parameter(0.0, low=..., high=..., typical=...)'
+    if hasattr(effect, 'reach'):
+        return 'defines reach, which is called widening now; rename it'
     if all(getattr(effect, place) is getattr(Effect, place) for place in PLACES):
         return f'does nothing; define one of {", ".join(PLACES)}'
     if effect.acts('pattern_scale') and not effect.acts('widening'):

@@ -94,11 +94,6 @@ def words_of(text: str) -> tuple[str, ...]:
     return tuple(re.findall(r'[^\W_]+|#', spaced))
 
 
-def length_of(text: str) -> float | None:
-    """Metres in a unit of length that stands alone, None where it is none."""
-    return LENGTHS.get(_small(text).strip(' .[]()'))
-
-
 def unit_of(text: str) -> str:
     """What stands in a row of units, as a heading has its unit."""
     unit = _small(text).strip(' .[]()-–—')

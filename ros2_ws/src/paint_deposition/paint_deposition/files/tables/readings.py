@@ -16,8 +16,8 @@ from paint_deposition.files.tables.headings import (
     Heading,
     find_table,
     headings_in,
-    length_of,
     rows_below,
+    unit_of,
     words_of,
 )
 from paint_deposition.files.tables.reading_columns import (
@@ -207,7 +207,7 @@ class ReadingTable(Table):
         """Metres in the unit of the thickness that a column, or a line above the table, has."""
         if self.has('unit'):
             texts = sorted({*self.of('unit')} - {''})
-            units = {length_of(text) for text in texts}
+            units = {LENGTHS.get(unit_of(text)) for text in texts}
             if len(units) > 1 or not units <= {*FILM_UNITS}:
                 found = ', '.join(map(repr, texts))
                 raise self.error(f'the thickness is in {found}; give all of it in µm, mil or mm')
@@ -215,7 +215,7 @@ class ReadingTable(Table):
         for row in sheet.rows[:header]:
             cells = [part for cell in row for part in text_of(cell).split(':') if part]
             if len(cells) > 1 and ' '.join(words_of(cells[0])) in ALIASES['unit']:
-                return length_of(cells[1])
+                return LENGTHS.get(unit_of(cells[1]))
         return None
 
     def has(self, *quantities: str) -> bool:
