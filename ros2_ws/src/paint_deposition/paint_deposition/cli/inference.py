@@ -12,7 +12,7 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import chosen_model
-from paint_deposition.cli.results import Progress, Results, print_all, results_options
+from paint_deposition.cli.results import Results, print_all, progress, results_options
 from paint_deposition.errors import PaintError
 
 RESULTS = results_options('the results')
@@ -43,7 +43,7 @@ def _run(
     The ``verb`` takes of the model's file what it ``begins_with``, and ``lines`` put its result
     into words. The line on the model says whether it was ``fitted``, or is ``words``.
     """
-    with Progress(command) as show:
+    with progress(command) as show:
         data = pd.read_campaign(
             campaign, show, part_pose,
             lambda kind, name, line: print_all(kind, [f'{name}: {line}']), zones_file,

@@ -11,7 +11,7 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import model_for
-from paint_deposition.cli.results import Progress, print_all
+from paint_deposition.cli.results import print_all, progress
 from paint_deposition.errors import some
 from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
@@ -282,7 +282,7 @@ def _gun_on_part(
 
     And the model that says where its spray goes.
     """
-    with Progress('inspect') as show:
+    with progress('inspect') as show:
         show('reading')
         recorded = pd.read_recording(path, **motion)
         model = model_for(model_file, path)[0].model

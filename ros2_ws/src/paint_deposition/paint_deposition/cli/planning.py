@@ -12,7 +12,7 @@ import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import chosen_model, model_for, robot_cell
 from paint_deposition.cli.options import Part, options_of
-from paint_deposition.cli.results import Progress, Results, inputs, results_options, zone_lines
+from paint_deposition.cli.results import Results, inputs, progress, results_options, zone_lines
 from paint_deposition.planning.requests import (
     GunEnvelope,
     ImproveRequest,
@@ -110,7 +110,7 @@ def plan_command(
         if given_it and not (request.optimise or part.zones_file):
             option = name.replace('_', '-')
             raise click.UsageError(f'--{option} is for --optimise; give that too, or leave it out')
-    with Progress('plan') as show:
+    with progress('plan') as show:
         show('reading the mesh')
         surface = part.surface()
         given: dict[str, Any] = {
@@ -206,7 +206,7 @@ def improve_command(
     """
     from paint_deposition.files.motion_files import holds_joints
 
-    with Progress('improve') as show:
+    with progress('improve') as show:
         show('reading')
         (file, of_model), part_pose = model_for(model_file, trajectory), motion['part_pose']
         robot = {name: motion[name] for name in ('urdf', 'tip_link', 'base_link')}
@@ -310,7 +310,7 @@ def place_command(
         for span, about in zip((x_m, y_m), part_pose[:2], strict=True)
     ]
     x, y = (low + step_m * np.arange(int((high - low) / step_m + 1e-6) + 1) for low, high in spans)
-    with Progress('place') as show:
+    with progress('place') as show:
         show('reading')
         recorded = pd.read_recording(trajectory)
         found = place(recorded, cell, x, y, free_roll, show)

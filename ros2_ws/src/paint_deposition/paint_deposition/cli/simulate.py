@@ -13,10 +13,10 @@ import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import chosen_model, model_for, models_for
 from paint_deposition.cli.results import (
-    Progress,
     Results,
     inputs,
     print_all,
+    progress,
     results_options,
     zone_lines,
 )
@@ -87,7 +87,7 @@ def simulate_command(
     """
     if wet_on_wet and not coats:
         raise click.UsageError('--wet-on-wet has no --coat; name the coats, one for each motion')
-    with Progress('simulate') as show:
+    with progress('simulate') as show:
         show('loading')
         from paint_deposition.files.motion_files import MotionSource, read_gun_motions
         from paint_deposition.request import validate
@@ -184,7 +184,7 @@ def sweep_command(sweep: Path, results: Results, scheduler: str | None, count: i
         raise click.UsageError('--workers is for this machine; leave it out beside --scheduler')
     from paint_deposition.batch.sweep import sweep as computed
 
-    with Progress('sweep') as show:
+    with progress('sweep') as show:
         found = computed(sweep, results.output, scheduler=scheduler, count=count, progress=show)
         show('writing and drawing')
         results.write(found)
@@ -283,7 +283,7 @@ def measure_command(
             '--target-um, --speed and --brush are of planned passes, --trajectory gives others; '
             'leave one of them out'
         )
-    with Progress('measure') as show:
+    with progress('measure') as show:
         show('reading')
         surface = part.surface()
         warnings: tuple[str, ...] = ()
