@@ -5,7 +5,6 @@ import re
 import subprocess
 import sys
 from functools import partial
-from xml.etree import ElementTree
 
 import matplotlib
 import numpy as np
@@ -88,7 +87,7 @@ def test_what_is_no_result_is_refused(take, tmp_path):
 
 @pytest.mark.parametrize('which', ['film', 'comparison'])
 def test_a_result_is_a_table(which, request, tmp_path, monkeypatch):
-    """With the columns of its file; in a notebook a short one, as text that cannot run."""
+    """With the columns of its file."""
     result = request.getfixturevalue(which)
     pd.write(result, tmp_path)
     name = {'film': 'film.csv', 'comparison': 'residuals.csv'}[which]
@@ -97,7 +96,6 @@ def test_a_result_is_a_table(which, request, tmp_path, monkeypatch):
     assert tuple(columns) == written.dtype.names
     for key in ('x_m', 'thickness_um'):
         assert np.allclose(written[key], columns[key], rtol=1e-4, atol=1e-3), key
-    assert ElementTree.fromstring(result._repr_html_()).find('caption').text == repr(result)
     monkeypatch.setitem(sys.modules, 'pandas', None)
     with pytest.raises(pd.PaintError, match=r'needs pandas, .*; run: pip install pandas'):
         result.to_dataframe()
@@ -125,6 +123,5 @@ def test_the_code_of_the_page_runs(repository, tmp_path, monkeypatch, undrawn):
     exec('\n'.join(re.findall(r'```python\n(.*?)```', page, re.DOTALL)), names)
     assert isinstance(names['film'], pd.Film)
     assert names['diagnosis'].accepted == ('incidence_attraction',)
-    (row,) = ElementTree.fromstring(names['diagnosis']._repr_html_()).findall('tbody/tr')
-    assert row[0].text == names['diagnosis'].columns()['best'][0] == 'incidence_attraction'
+    assert names['diagnosis'].columns()['best'] == ['incidence_attraction']
     assert (tmp_path / 'results/diagnosis/report.html').is_file()

@@ -2,7 +2,6 @@
 
 import zipfile
 from collections.abc import Mapping, Sequence
-from io import BytesIO
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -61,49 +60,3 @@ def _cell(value: object, row: int, column: int) -> str:
     if isinstance(value, int | float):
         return f'<c r="{place}"><v>{value}</v></c>'
     return f'<c r="{place}" t="inlineStr"><is><t>{escape(str(value))}</t></is></c>'
-
-
-SPREADSHEET = 'application/vnd.oasis.opendocument.spreadsheet'
-OPEN_DOCUMENT = 'urn:oasis:names:tc:opendocument:xmlns'
-
-
-def open_document(rows: str) -> bytes:
-    """An .ods file with one sheet of these `table:table-row` elements."""
-    spaces = ' '.join(
-        f'xmlns:{name}="{OPEN_DOCUMENT}:{name}:1.0"' for name in ('office', 'table', 'text')
-    )
-    manifest = f'{OPEN_DOCUMENT}:manifest:1.0'
-    made = BytesIO()
-    with zipfile.ZipFile(made, 'w') as book:
-        book.writestr('mimetype', SPREADSHEET)
-        book.writestr(
-            'META-INF/manifest.xml',
-            f'<manifest:manifest xmlns:manifest="{manifest}"><manifest:file-entry '
-            f'manifest:full-path="/" manifest:media-type="{SPREADSHEET}"/></manifest:manifest>',
-        )
-        book.writestr(
-            'content.xml',
-            f'<office:document-content {spaces}><office:body><office:spreadsheet>'
-            f'<table:table table:name="Readings">{rows}</table:table>'
-            '</office:spreadsheet></office:body></office:document-content>',
-        )
-    return made.getvalue()
-
-
-def open_row(*values: object, rows: int = 1, last: int = 1, empty: int = 0) -> str:
-    """A row that stands there so often, as its last cell does, and empty cells after it."""
-    cells = ''.join(
-        f'<table:table-cell{_repeated("columns", last if k == len(values) else 1)} '
-        + (
-            f'office:value-type="float" office:value="{value}"/>'
-            if isinstance(value, float)
-            else f'office:value-type="string"><text:p>{value}</text:p></table:table-cell>'
-        )
-        for k, value in enumerate(values, 1)
-    )
-    after = f'<table:table-cell{_repeated("columns", empty)}/>' if empty else ''
-    return f'<table:table-row{_repeated("rows", rows)}>{cells}{after}</table:table-row>'
-
-
-def _repeated(what: str, times: int) -> str:
-    return f' table:number-{what}-repeated="{times}"' if times != 1 else ''

@@ -24,7 +24,7 @@ from paint_deposition.cli import results, samples
 from paint_deposition.cli.main import COMMANDS
 from paint_deposition.cli.main import paint as group
 from paint_deposition.cli.options import options_of
-from paint_deposition.cli.results import Progress
+from paint_deposition.cli.results import progress
 from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request, given, takes
 from waiting import until
 
@@ -139,7 +139,7 @@ def shown(terminal: Terminal, count: int) -> list[str]:
 @pytest.mark.slow
 def test_the_clock_runs_within_a_step_and_a_known_share_is_a_bar():
     terminal = Terminal()
-    with redirect_stderr(terminal), Progress('diagnose', after_s=0.0) as show:
+    with redirect_stderr(terminal), progress('diagnose', after_s=0.0) as show:
         show('fitting the pattern')
         lines = shown(terminal, 3)
         assert lines[-1].startswith('diagnose: fitting the pattern [00:0')
@@ -148,7 +148,7 @@ def test_the_clock_runs_within_a_step_and_a_known_share_is_a_bar():
     assert lines[-1].startswith('diagnose: film:  25%|')
     # When it is piped nothing is shown.
     pipe = io.StringIO()
-    with redirect_stderr(pipe), Progress('plan', after_s=0.0) as show:
+    with redirect_stderr(pipe), progress('plan', after_s=0.0) as show:
         show('film', 0.25)
     assert pipe.getvalue() == ''
 
@@ -263,8 +263,9 @@ def test_no_other_python_takes_a_module_from_the_current_folder(tmp_path, monkey
     for name in ('numpy', 'rclpy', 'mine'):
         (tmp_path / f'{name}.py').write_text('open("ran", "w")')
     monkeypatch.chdir(tmp_path)
-    found = {one.name: one for one in samples._ros()}
-    assert middleware in found['ROS 2'].found
+    ((name, found, *_),) = samples._ros()
+    assert name == 'ROS 2'
+    assert middleware in found
     command = results.python('import numpy; print(numpy.array(sys.argv[1:]))\nimport mine', 'a')
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.stdout == "['a']\n"

@@ -8,7 +8,7 @@ import pytest
 import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import COARSE, ran, rows_of, told_in
-from paint_deposition.files.provenance import model_digest, model_of_plan, origin, planned_model
+from paint_deposition.files.provenance import model_digest, origin, planned_model
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.motion.programmed import PROGRAMMED
 
@@ -106,7 +106,8 @@ def test_a_model_that_is_given_wins_and_is_named(plan, tmp_path):
     assert '--model' in warning
     # Another model of that name is not taken for it.
     (tmp_path / 'model.yaml').write_text('effects: []\n')
-    assert model_of_plan(*planned_model(tmp_path / 'passes.mod')) is None
+    _, done = simulated(tmp_path / 'passes.mod', tmp_path / 'out')
+    assert warning in done.stderr.splitlines()
 
 
 def test_the_digest_is_that_of_the_values(model_file, tmp_path):

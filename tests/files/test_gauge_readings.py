@@ -1,5 +1,7 @@
 """Readings, zones and brushes in files: what is read, and one clear line for each fault."""
 
+import zipfile
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -113,7 +115,13 @@ def test_a_file_that_is_no_table_is_refused(tmp_path):
     with pytest.raises(ReadingsError, match='no such file; give a table as CSV'):
         read_readings(tmp_path / 'none.csv')
     path = tmp_path / 'file'
-    for content, kind in ((b'x_m,\xff\xfe\x00', 'text'), (b'PK\x03\x04 and none', 'a workbook')):
+    package = BytesIO()
+    with zipfile.ZipFile(package, 'w') as opened:
+        opened.writestr('content.xml', '<office:document-content/>')
+    for content, kind in (
+        (b'x_m,\xff\xfe\x00', 'text'), (b'PK\x03\x04 and none', 'a workbook'),
+        (package.getvalue(), r'a workbook \(an \.ods; save it as \.xlsx\); give a table as CSV'),
+    ):  # fmt: skip
         path.write_bytes(content)
         with pytest.raises(ReadingsError, match=f'cannot be read as {kind}'):
             read_readings(path)

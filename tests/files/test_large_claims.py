@@ -19,7 +19,6 @@ from fuzz.targets import RAPID, targets
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings import bag_files
 from paint_deposition.files.recordings.bag_files import custom_data, open_bag
-from workbook import open_document, open_row
 
 CLAIMED = 1_000_000_000
 J = 0x4E4F534A  # a chunk of JSON
@@ -98,11 +97,6 @@ def _blanks() -> bytes:
     return made.getvalue()
 
 
-def _repeated_cells() -> bytes:
-    row = open_row('A', 1.0, rows=1_000_000, last=16_000)
-    return open_document(open_row('point', 'thickness_um') + row)
-
-
 RAPID_BODIES = {
     'arrays': b'VAR num x{1000,1000,1000}; x{1,1,1}:=1;',
     'copies': b'VAR num x{100000}; VAR num y{100000}; FOR i FROM 1 TO 9999 DO y:=x; ENDFOR',
@@ -143,7 +137,6 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'strings of a schema': ('mcap', lambda: _mcap_with(b'string[2000000000] a\n')),
     'blanks of a workbook': ('workbook', _blanks),
     'a far row of a workbook': ('worksheet', lambda: _row(b'<row r="1048576"><c r="XFD1"')),
-    'repeated cells of an open document': ('workbook', _repeated_cells),
     'a cell no sheet has': ('worksheet', lambda: _row(b'<row r="1"><c r="AAAAA999999991"')),
     **{f'{name} of RAPID': ('rapid', partial(_main, body)) for name, body in RAPID_BODIES.items()},
     'calls of RAPID': ('rapid', _calls),

@@ -1,7 +1,6 @@
 """Meshes: what is read, put right and refused; their units, and several bodies in one file."""
 
 import importlib.util
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +104,6 @@ def broken(path, kind):
         ('part.stl', 'garbage', 'neither a text STL nor'),
         ('part.ply', 'garbage', 'not readable as a mesh'),
         ('part.glb', 'garbage', 'not readable as a mesh'),
-        ('part.3mf', 'garbage', 'not readable as a mesh'),
         ('part.stl', 'empty file', 'no triangles'),
         ('part.stl', 'truncated', '32042 bytes, a complete binary one'),
         ('part.ply', 'not finite', 'not finite'),
@@ -214,20 +212,6 @@ def test_one_body_is_taken_by_its_name_also_of_an_obj_and_a_text_stl(tmp_path):
     (tmp_path / 'part.stl').write_text('\n'.join(text))
     assert read_mesh(tmp_path / 'part.stl', body='far').vertices_m[:, 0].min() > 0.8
     assert read_mesh(tmp_path / 'part.stl').area_m2 == pytest.approx(0.48)
-
-
-@pytest.mark.parametrize(('unit', 'per_metre'), [('inch', 1 / 0.0254), ('meter', 1.0)])
-def test_3mf_is_read_in_its_own_unit(tmp_path, unit, per_metre):
-    path, in_millimetres = tmp_path / 'door.3mf', tmp_path / 'as_written.3mf'
-    two_bodies(per_metre).export(in_millimetres)
-    with zipfile.ZipFile(in_millimetres) as old, zipfile.ZipFile(path, 'w') as new:
-        for item in old.namelist():
-            content = old.read(item).replace(b'unit="millimeter"', f'unit="{unit}"'.encode())
-            new.writestr(item, content)
-    surface = read_mesh(path, max_edge_length_m=0.2)
-    assert surface.area_m2 == pytest.approx(area_m2(DOOR_M, FLANGE_M), rel=1e-5)
-    assert unit.removesuffix('er') in surface.notes[0]
-    assert '2 bodies' in surface.notes[1]
 
 
 @needs_step

@@ -28,10 +28,6 @@ from paint_deposition.files.tables.reading_columns import Layout
 from robot_arm import URDF
 from workbook import write_workbook
 
-GAUGE_JSON = (
-    b'{"unit": "um", "results": [{"x_m": 0, "y_m": 0, "z_m": 0, "thickness_um": 20, "id": "a"}, '
-    b'{"x_m": 0, "y_m": 0, "z_m": 1, "thickness_um": 21.5, "id": null}]}'
-)
 RAPID = rb"""MODULE Door
   PERS wobjdata wobjDoor:=[FALSE,TRUE,"",[[900,0,600],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
   CONST robtarget p1:=[[0,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
@@ -111,9 +107,8 @@ def _mesh(path: Path) -> object:
     return pd.read_mesh(path, max_edge_length_m=5.0)
 
 
-def _box(kind: str, scale: float = 1.0, **options: str) -> bytes:
-    sides = (0.4 * scale, 0.02 * scale, 0.3 * scale)
-    made = trimesh.creation.box(sides).export(file_type=kind, **options)
+def _box(kind: str, **options: str) -> bytes:
+    made = trimesh.creation.box((0.4, 0.02, 0.3)).export(file_type=kind, **options)
     return made.encode() if isinstance(made, str) else made
 
 
@@ -140,12 +135,6 @@ def _written(write: Callable[[Path], object], name: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         write(Path(folder) / name)
         return (Path(folder) / name).read_bytes()
-
-
-def _batch(path: Path) -> None:
-    with zipfile.ZipFile(path, 'w') as package:
-        package.writestr('B1/header.txt', 'Name,B1\n')
-        package.writestr('B1/readings.txt', 'x_m,y_m,z_m,thickness_um\n0,0,0,20\n0,0,1,21\n')
 
 
 def _entries(ros1: bool = False) -> list[tuple[str, int, object]]:
@@ -208,7 +197,6 @@ def targets() -> dict[str, Target]:
     cells = 'x_mm thickness_um mils [mm] ; \t " 1e308 nan - ,,'
     rows = [['x_m', 'y_m', 'z_m', 'thickness_um'], [0.1, 0.0, 0.2, 24.5], [0.2, 0.0, 0.2, 'n/a']]
     book = _written(lambda path: write_workbook(path, {'Readings': rows}), 'book.xlsx')
-    in_mm = _box('3mf', 1000.0)
     ros1 = _written(lambda path: write_bag(path, _entries(True), 'ros1'), 'run.bag')
     readings = [path.read_bytes() for path in sorted(LAYOUTS.glob('*.txt'))]
     model = (SAMPLES.parents[3] / 'config/model.yaml').read_bytes()
@@ -220,10 +208,6 @@ def targets() -> dict[str, Target]:
             '{1} .trans /0 not 9E9 - FOR WHILE TRUE DO ENDFOR IF TEST RETURN Incr UseBrushTab ,',
         ),
         'readings': Target('.csv', pd.read_readings, readings, cells),
-        'gauge_json': Target(
-            '.json', pd.read_readings, [GAUGE_JSON], '[ ] { } , : " null NaN 1e999 -1 "x": [[ []',
-        ),
-        'gauge_zip': Target('.zip', pd.read_readings, [_written(_batch, 'B1.zip')]),
         'measuring_points': Target(
             '.csv', lambda path: MeasuringPoints.read(path, Layout(), None), [points], cells
         ),
@@ -241,10 +225,6 @@ def targets() -> dict[str, Target]:
         ),
         'obj': Target('.obj', _mesh, [_box('obj')], 'v f vt o mtllib /'),
         'glb': Target('.glb', _mesh, [_box('glb')], '"count":1000000000 "byteOffset": "nodes":'),
-        '3mf': Target(
-            '.3mf', _mesh, [_member(in_mm, '.model')], '<vertex <triangle v1=" unit="inch"',
-            _in_zip(in_mm, '.model'),
-        ),
         'ros1': Target('.bag', _bag, [ros1]),
         'mcap': Target('.mcap', _bag, [_mcap()]),
         'mcap_recovery': Target('.mcap', _recovered, [_mcap()]),

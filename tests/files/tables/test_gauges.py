@@ -4,8 +4,6 @@ The layouts follow the makers' manuals: lines about the batch, a table with unit
 or in a column of its own, and the statistics of the batch below it.
 """
 
-import shutil
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +11,9 @@ import pytest
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.gauge_readings import read_readings, write_predictions
-from paint_deposition.files.tables.gauge_formats import FOLDERS, FORMATS, LINES
+from paint_deposition.files.tables.gauge_formats import FOLDERS, FORMATS
 from paint_deposition.files.tables.reading_columns import Layout
-from workbook import open_document, open_row, write_workbook
+from workbook import write_workbook
 
 LAYOUTS = Path(__file__).with_name('layouts')
 FILMS_UM = [21.5, 22.5, 24.0, 19.5]
@@ -27,21 +25,15 @@ MERGED = [
 
 # The file, and the films [µm] and the points of its rows where they are not those four in order.
 CASES: dict[str, tuple[str, ...]] = {
-    'coatmaster Flex, CSV or JSON': ('coatmaster.csv', '21.5 22.5 19.5', 'P1 P2 P4'),
-    'coatmaster Flex, JSON': ('coatmaster.json', '21.5 22.5 19.5', 'P1 P2 P4'),
+    'coatmaster Flex': ('coatmaster.csv', '21.5 22.5 19.5', 'P1 P2 P4'),
     'BYK auto-chart': ('byk.csv',),
     'DeFelsko PosiTector, Value': ('positector_value.csv',),
     'DeFelsko PosiTector, Thickness': ('positector_thickness.csv',),
     'PosiTector batch, folder': ('B1',),
-    'PosiTector batch, zip': ('B1.zip',),
-    'PosiTector, serial': ('serial.txt',),
-    'PosiTector, serial with a missing one': ('serial_missing.txt', '21.5 19.5', 'P1 P4'),
-    'Fischer, printed': ('printed.txt',),
     'spots of SSPC-PA 2': ('spots.csv', '21 22 21.5 22.5 22.5', 'P1 P1 P1 P2 P2'),
     'German statistics': ('german.csv',),
     'Japanese': ('japanese.csv', '21.5 21.7 22.5 22.3', 'P1 P1 P2 P2'),
     'two rows of headings': ('merged.xlsx', '21.5 22.5', 'P1 P2'),
-    'repeats in a cell': ('repeats.csv', '21.5 22.1 21 22.5', 'P1 P1 P1 P2'),
 }
 
 
@@ -58,9 +50,7 @@ def test_a_layout_is_read_as_it_is_written(name, tmp_path, points):
     name, *expected = CASES[name]
     films, labels = expected or (' '.join(map(str, FILMS_UM)), 'P1 P2 P3 P4')
     path = LAYOUTS / name
-    if name == 'B1.zip':
-        path = shutil.make_archive(tmp_path / 'B1', 'zip', LAYOUTS, 'B1')
-    elif name == 'merged.xlsx':
+    if name == 'merged.xlsx':
         path, points = write_workbook(tmp_path / name, {'Messung': MERGED}), None
     readings = read_readings(path, points)
     assert readings.thickness_um == pytest.approx([*map(float, films.split())], abs=2e-3)
@@ -70,7 +60,7 @@ def test_a_layout_is_read_as_it_is_written(name, tmp_path, points):
 
 
 def test_each_known_layout_has_its_case():
-    layouts = {*(one.name for one in FORMATS), *LINES, *FOLDERS} - {'coordinate measuring machine'}
+    layouts = {*(one.name for one in FORMATS), *FOLDERS} - {'coordinate measuring machine'}
     assert not [name for name in layouts if not any(case.startswith(name) for case in CASES)]
 
 
@@ -131,20 +121,11 @@ def test_a_count_or_a_wrong_label_names_no_point(text, message, file, points):
         read_readings(file('f.csv', text), points)
 
 
-def test_a_folder_or_a_zip_with_several_tables_is_refused(tmp_path):
-    folder, path = tmp_path / 'two', tmp_path / 'two.zip'
-    folder.mkdir()
-    with zipfile.ZipFile(path, 'w') as package:
-        for name in ('monday', 'tuesday'):
-            (folder / f'{name}.csv').write_text('DFT\n1\n')
-            package.writestr(f'{name}/door.csv', 'x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
-    with pytest.raises(
-        ReadingsError, match=r'two holds monday\.csv, tuesday\.csv; name the one with the tab'
-    ):
-        read_readings(folder)
-    # Files of one name in a zip are not taken for each other.
-    with pytest.raises(ReadingsError, match=r'holds monday/door\.csv, tuesday/door\.csv;'):
-        read_readings(path)
+def test_a_folder_with_several_tables_is_refused(tmp_path):
+    for name in ('monday', 'tuesday'):
+        (tmp_path / f'{name}.csv').write_text('DFT\n1\n')
+    with pytest.raises(ReadingsError, match=r'holds monday\.csv, tuesday\.csv; name the one with'):
+        read_readings(tmp_path)
 
 
 POINTS_M = np.array([[0.1, 0.0, 0.05], [0.1, 0.0, 0.2], [0.25, 0.0, 0.35]])
@@ -209,21 +190,6 @@ def test_spreadsheet(tmp_path):
     with pytest.raises(ReadingsError, match="tables in sheet 'left' and sheet 'right'; name one"):
         read_readings(twice)
     require_the_four_readings(read_readings(twice, layout=Layout(sheet='right')))
-
-
-def test_open_document_whose_empty_rest_is_said_to_repeat(tmp_path):
-    """As LibreOffice writes it: empty cells and rows to the end of the sheet."""
-    rows = [
-        ('Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke [µm]'),
-        ('A1', 100.0, 0.0, 50.0, 21.5),
-        ('A1', 100.0, 0.0, 50.0, 22.1),
-        ('A2', 100.0, 0.0, 200.0, 24.0),
-        ('A3', 250.0, 0.0, 350.0, 19.4),
-    ]
-    rest = open_row(rows=1_048_571, empty=16_384)
-    path = tmp_path / 'tuer.ods'
-    path.write_bytes(open_document(''.join(open_row(*row, empty=16_379) for row in rows) + rest))
-    require_the_four_readings(read_readings(path))
 
 
 # What else shops have: each is read as these readings, or refused with the reason.

@@ -26,7 +26,7 @@ ARGUMENTS = (
     (
         'mesh',
         '',
-        "The part's mesh: STL, PLY, OBJ, glTF, 3MF or STEP; empty: that of the parameter file, or "
+        "The part's mesh: STL, PLY, OBJ, glTF or STEP; empty: that of the parameter file, or "
         'the sample door without a file of your own [path]',
     ),
     ('model', '', 'Deposition model, model.yaml [path]'),

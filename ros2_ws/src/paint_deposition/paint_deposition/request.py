@@ -89,8 +89,8 @@ class OnePart(BaseModel):
 
     mesh_scale: Number = given(
         1.0,
-        'Metres per unit of the mesh file; 0.001 for millimetres. glTF, 3MF and STEP name their '
-        'unit: leave it out there.', above=0.0,
+        'Metres per unit of the mesh file; 0.001 for millimetres. glTF and STEP name their unit: '
+        'leave it out there.', above=0.0,
     )  # fmt: skip
     body: Text | None = given(
         None, 'The one body to take of a mesh file with several; default: all as one part.'
@@ -149,8 +149,8 @@ class MotionOptions(RobotArm, extra='forbid'):
     """What to read of a motion file, and where the part stands; None: not given."""
 
     pose_topic: Text | None = given(
-        None, 'Topic of the poses in a bag; default: its only PoseStamped topic. Of an array: '
-        '/poses[2]. With a URDF: joint states, several with blanks between them.',
+        None, 'Topic of the poses in a bag; default: its only PoseStamped topic. With a URDF: '
+        'joint states, several with blanks between them.',
     )  # fmt: skip
     state_topic: Text | None = given(
         None, 'Trigger of the gun: a topic of AtomizerState or Bool, a number in a field of any '

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from paint_deposition.batch.cases import compute, workers
 from paint_deposition.batch.job import PREDICTED, WARNINGS, Job, computed
@@ -238,24 +237,21 @@ def _write_picture(
     for row, (label, result) in zip(charts, results.items(), strict=True):
         for axes, name in zip(row, names, strict=True):
             quiet(axes, axes.get_xlabel(), label if axes is row[0] else '')
-            _draw(axes, varied[name], result, in_order=name != DRAW)
+            is_text = varied[name].dtype.kind == 'U'
+            there = np.isfinite(result) & (True if is_text else np.isfinite(varied[name]))
+            if not there.any():
+                continue
+            values, shown = varied[name][there], result[there]
+            axes.scatter(values, shown, s=14, color=ACCENT, alpha=0.55, linewidths=0)
+            places = np.unique(values)
+            # A line through the medians of few values.
+            few = not is_text and 1 < len(places) <= 12 and len(values) > len(places)
+            if few and name != DRAW:
+                medians = [np.median(shown[values == place]) for place in places]
+                axes.plot(places, medians, color=ACCENT, linewidth=1.4)
+            # Rounding alone is no result: the chart does not magnify it.
+            middle, span = np.median(shown), 0.01 * np.abs(np.median(shown))
+            if np.ptp(shown) < span:
+                axes.set_ylim(middle - span, middle + span)
     figure.suptitle(title, x=0.01, ha='left', fontsize=11, color=INK)
     return save_picture(figure, path)
-
-
-def _draw(axes: Axes, values: np.ndarray, result: np.ndarray, in_order: bool) -> None:
-    is_text = values.dtype.kind == 'U'
-    there = np.isfinite(result) & (True if is_text else np.isfinite(values))
-    if not there.any():
-        return
-    values, result = values[there], result[there]
-    axes.scatter(values, result, s=14, color=ACCENT, alpha=0.55, linewidths=0)
-    places = np.unique(values)
-    # A line through the medians of few values.
-    if in_order and not is_text and 1 < len(places) <= 12 and len(values) > len(places):
-        medians = [np.median(result[values == place]) for place in places]
-        axes.plot(places, medians, color=ACCENT, linewidth=1.4)
-    # Rounding alone is no result: the chart does not magnify it.
-    middle, span = np.median(result), 0.01 * np.abs(np.median(result))
-    if np.ptp(result) < span:
-        axes.set_ylim(middle - span, middle + span)

@@ -182,26 +182,21 @@ def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[
     if count > MOST_CASES:
         raise BatchError(f'{count} cases are more than {MOST_CASES}; vary less at once')
     grid = [dict(zip(file.grid, values, strict=True)) for values in product(*file.grid.values())]
-    blocks = product(grid, file.cases or [{}], _draws(file))
+    drawn_values: list[Values] = [{}] * draws
+    if file.sample:
+        rng = np.random.default_rng(file.sample.seed)
+        columns = {
+            name: getattr(rng, kind)(low, high, draws).tolist()
+            for name, (kind, low, high) in file.sample.vary.items()
+        }
+        columns |= {DRAW: list(range(draws))} if file.sample.posterior else {}
+        drawn_values = [{name: c[k] for name, c in columns.items()} for k in range(draws)]
+    blocks = product(grid, file.cases or [{}], drawn_values)
     found = [{**of_grid, **case, **draw} for of_grid, case, draw in blocks]
     for values in found:
         for name, value in values.items():
             _require_kind(name, value)
     return found
-
-
-def _draws(file: SweepFile) -> list[Values]:
-    if file.sample is None:
-        return [{}]
-    rng = np.random.default_rng(file.sample.seed)
-    columns = {}
-    for name, spread in file.sample.vary.items():
-        kind, low, high = spread
-        columns[name] = getattr(rng, kind)(low, high, file.sample.count).tolist()
-    if file.sample.posterior:
-        columns[DRAW] = list(range(file.sample.count))
-    return [{name: column[k] for name, column in columns.items()}
-            for k in range(file.sample.count)]  # fmt: skip
 
 
 def _require_known(name: str, known: Sequence[str]) -> None:

@@ -12,7 +12,7 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import chosen_model
-from paint_deposition.cli.results import Progress, Results, print_all, results_options
+from paint_deposition.cli.results import Results, print_all, progress, results_options
 from paint_deposition.errors import PaintError
 
 RESULTS = results_options('the results')
@@ -43,14 +43,14 @@ def _run(
     The ``verb`` takes of the model's file what it ``begins_with``, and ``lines`` put its result
     into words. The line on the model says whether it was ``fitted``, or is ``words``.
     """
-    with Progress(command) as show:
+    with progress(command) as show:
         data = pd.read_campaign(
             campaign, show, part_pose,
             lambda kind, name, line: print_all(kind, [f'{name}: {line}']), zones_file,
         )  # fmt: skip
         named = model_file or data.model_file
-        chosen = chosen_model(Path(named) if named else None, named=bool(model_file))
-        start = chosen.known if named else None
+        file, of_model = chosen_model(Path(named) if named else None, named=bool(model_file))
+        start = file if named else None
         known = {name: getattr(start, name, None) for name in begins_with}
         result = verb(data, progress=show, **known)
         show('writing')
@@ -62,7 +62,7 @@ def _run(
     for name, found in first.geometry.items() if first is result else ():
         said.append(f'{name}: {found.sentence}')
         warnings += (f'{name}: {line}' for line in found.warnings)
-    source = chosen.words if start else 'a 50 mm bell'
+    source = of_model if start else 'a 50 mm bell'
     begin = 'fitted to the campaign, from ' if fitted or start is None else ''
     results.print(said, words or begin + source, data.understood, warnings)
 
@@ -220,15 +220,16 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
     on from there, give that model.yaml as --model.
     """
     from paint_deposition.effects.catalogue import effect_class
+    from paint_deposition.effects.learned_curves import LearnedCurve
     from paint_deposition.files.effect_file import load_effect_file
+    from paint_deposition.inference.diagnosis.closed_forms import forms_of
+    from paint_deposition.report.write_inference import effect_entry, write_effect_file
 
     added = None
     if effect != 'none':
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
     if effect_file is not None:
         # What cannot become an effect file is refused before anything is computed.
-        from paint_deposition.effects.learned_curves import LearnedCurve
-
         if not (isinstance(added, type) and issubclass(added, LearnedCurve)):
             raise click.UsageError(
                 f'--as-effect is for a law learned over one covariate, and --add is {effect}; '
@@ -243,26 +244,19 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
 
     def lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
         yield from _diagnosis_lines(diagnosis, 'added as asked: ')
-        if effect_file is not None:
-            yield _write_as_effect(diagnosis, effect_file)
+        if effect_file is None:
+            return
+        law = diagnosis.model.effects[-1]
+        form = next(iter(forms_of(law)), None)
+        if form is None or not isinstance(law, LearnedCurve):
+            raise PaintError(
+                f'--as-effect {effect_file}: no closed form of few parameters fits the law within '
+                'its band; use the curve itself, which stands in model.yaml if the fit was sound'
+            )
+        write_effect_file(effect_file, law, form)
+        yield f'effect file: {form.formula}; in a model {{{effect_entry(form, effect_file)}}}'
 
     _run('refit', partial(pd.refit, added=added, seed=seed), lines, **given)
-
-
-def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
-    """Write the law learned last as an effect, and say how to use it."""
-    from paint_deposition.effects.learned_curves import LearnedCurve
-    from paint_deposition.inference.diagnosis.closed_forms import forms_of
-    from paint_deposition.report.write_inference import effect_entry, write_effect_file
-
-    law, forms = diagnosis.model.effects[-1], forms_of(diagnosis.model.effects[-1])
-    if not forms or not isinstance(law, LearnedCurve):
-        raise PaintError(
-            f'--as-effect {effect_file}: no closed form of few parameters fits the law within '
-            'its band; use the curve itself, which stands in model.yaml if the fit was sound'
-        )
-    write_effect_file(effect_file, law, forms[0])
-    return f'effect file: {forms[0].formula}; in a model {{{effect_entry(forms[0], effect_file)}}}'
 
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[str]:

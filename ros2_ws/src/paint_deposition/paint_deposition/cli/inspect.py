@@ -11,7 +11,7 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import model_for
-from paint_deposition.cli.results import Progress, print_all
+from paint_deposition.cli.results import print_all, progress
 from paint_deposition.errors import some
 from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
@@ -100,7 +100,7 @@ def _contents(
     from paint_deposition.files.recordings.messages import STATE_TYPE
     from paint_deposition.files.recordings.pose_topics import sources_of_poses
     from paint_deposition.files.tables.poses import holds_readings, is_pose_table
-    from paint_deposition.files.tables.sheets import is_gauge_file
+    from paint_deposition.files.tables.sheets import is_gauge_folder
     from paint_deposition.request import validate
 
     source = validate(MotionSource, 'motion', motion, RecordingError)
@@ -108,7 +108,7 @@ def _contents(
         _only('a mesh', 'mesh_scale', 'body')
         return _mesh_contents(path, part)
     is_table = is_pose_table(path)
-    if is_gauge_file(path) or (is_table and holds_readings(path, points_file is not None)):
+    if is_gauge_folder(path) or (is_table and holds_readings(path, points_file is not None)):
         _only('gauge readings', 'points_file')
         return _readings_contents(path, points_file)
     if is_table:
@@ -282,10 +282,10 @@ def _gun_on_part(
 
     And the model that says where its spray goes.
     """
-    with Progress('inspect') as show:
+    with progress('inspect') as show:
         show('reading')
         recorded = pd.read_recording(path, **motion)
-        model = model_for(model_file, path).known.model
+        model = model_for(model_file, path)[0].model
         seen = pd.look_at(part.surface(), recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:
             from paint_deposition.report.plan_pictures import write_geometry_picture

@@ -82,15 +82,6 @@ class Commands(click.Group):
         ]
         return commands + click.Command.shell_complete(self, context, incomplete)
 
-    def resolve_command(
-        self, context: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """A pose may also be given in one piece, in quotes."""
-        name, command, rest = super().resolve_command(context, args)
-        for place in [k for k, word in enumerate(rest) if word == '--part-pose'][::-1]:
-            rest[place + 1 : place + 2] = ' '.join(rest[place + 1 : place + 2]).split()
-        return name, command, rest
-
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section('Commands'):
             formatter.write_dl([(name, summary) for name, (_, summary, _) in COMMANDS.items()])

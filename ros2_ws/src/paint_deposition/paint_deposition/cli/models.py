@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,17 +18,10 @@ if TYPE_CHECKING:
     from paint_deposition.planning.driving import RobotCell
 
 
-@dataclass(frozen=True)
-class ChosenModel:
-    """A model with what is known of it, the file that it is from, and the line for the user."""
+def chosen_model(given: Path | None, brush: int = 0, named: bool = True) -> tuple[ModelFile, str]:
+    """The model of a file, else the default, and the line for the user.
 
-    known: ModelFile
-    path: Path | None  # None: it is the default, a 50 mm bell
-    words: str
-
-
-def chosen_model(given: Path | None, brush: int = 0, named: bool = True) -> ChosenModel:
-    """The model of a file, else the default; brush: that of --brush, 0 for none.
+    ``brush`` is that of --brush, 0 for none.
 
     A file that is not ``named`` by the user, but by a recording, runs no effect files unasked.
     """
@@ -38,18 +31,20 @@ def chosen_model(given: Path | None, brush: int = 0, named: bool = True) -> Chos
     file, words = ModelFile(pd.DepositionModel()), 'default, a 50 mm bell; --model gives another'
     if given is not None:
         file = read_model_file(given, load_effect_file if named else load_unnamed_effect_file)
-        words = model_words(given, file) + (f', brush {brush}' if brush else '')
+        words = model_words(file) + (f', brush {brush}' if brush else '')
     if brush:
         file = replace(file, model=file.model.with_brush(brush))
-    return ChosenModel(file, given, words)
+    return file, words
 
 
-def model_for(given: Path | None, motion: Path, named: bool = True) -> ChosenModel:
+def model_for(given: Path | None, motion: Path, named: bool = True) -> tuple[ModelFile, str]:
     """The model of a file, else the one that the motion was planned with, else a bell.
 
     ``named`` is as for ``chosen_model``. Warnings go to stderr.
     """
-    from paint_deposition.files.provenance import model_digest, model_of_plan, planned_model
+    from paint_deposition.files.effect_file import load_unnamed_effect_file
+    from paint_deposition.files.model_file import read_model_file
+    from paint_deposition.files.provenance import model_digest, planned_model
 
     planned = planned_model(motion)
     chosen = chosen_model(given, named=named)
@@ -57,25 +52,24 @@ def model_for(given: Path | None, motion: Path, named: bool = True) -> ChosenMod
         return chosen
     path, digest = planned
     if given is not None:
-        model = chosen.known.model
+        model = chosen[0].model
         alike = [model, *(model.with_brush(brush.number) for brush in model.brushes)]
         if digest not in map(model_digest, alike):
             print_all('note', [f'{motion} was planned with another model ({digest[:12]})'])
         return chosen
-    file = model_of_plan(path, digest)
-    if file is None:
+    file = read_model_file(path, load_unnamed_effect_file) if path.is_file() else None
+    if file is None or model_digest(file.model) != digest:
         print_all('warning', [
             f'{motion} was planned with a model ({digest[:12]}) that is not in '
             f'{path}; give it with --model, or the film is another one than planned'
         ])  # fmt: skip
         return chosen
-    words = f'that of the plan, {model_words(path, file)}'
-    return ChosenModel(file, path, words)
+    return file, f'that of the plan, {model_words(file)}'
 
 
 def models_for(
     given: Sequence[Path], motions: Sequence[Path], guns: Sequence[str], named: bool = True
-) -> list[ChosenModel]:
+) -> list[tuple[ModelFile, str]]:
     """The model of each gun: one of those named with --model, else as ``model_for`` has it.
 
     Models and motions are given once for all guns or once for each.
@@ -92,10 +86,10 @@ def models_for(
     each = motions if len(motions) == len(guns) else [motions[0]] * len(guns)
     chosen = [model_for(*pair, named) for pair in zip(files, each, strict=True)]
     names = [f'{gun}: ' if len(given) > 1 else '' for gun in guns]
-    return [replace(m, words=name + m.words) for name, m in zip(names, chosen, strict=True)]
+    return [(file, name + words) for name, (file, words) in zip(names, chosen, strict=True)]
 
 
-def model_words(path: Path, file: ModelFile) -> str:
+def model_words(file: ModelFile) -> str:
     """'runs/model.yaml (1a2b3c4d5e6f), brushes: 1, 2, effects: air_drift'."""
     from paint_deposition.files.provenance import model_digest
 
@@ -104,7 +98,7 @@ def model_words(path: Path, file: ModelFile) -> str:
     digest = model_digest(file.model)[:12]
     brushes = ', '.join(str(brush.number) for brush in file.model.brushes)
     of_brushes = f', brushes: {brushes}' if brushes else ''
-    return f'{path}{called} ({digest}){of_brushes}, effects: {effects}'
+    return f'{file.path}{called} ({digest}){of_brushes}, effects: {effects}'
 
 
 def robot_cell(robot: dict[str, Any], part_pose: list[float] | None) -> RobotCell | None:

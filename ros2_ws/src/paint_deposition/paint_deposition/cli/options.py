@@ -275,7 +275,7 @@ def part_options(
     """A command takes the ``Part``."""
     options: list[Decorator] = [
         click.option('--mesh', required=required, type=FILE,
-                     help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'),
+                     help='The part: STL, PLY, OBJ, glTF or STEP.'),
         *(option_of(OnePart, name) for name in ('mesh_scale', 'body', 'down')),
         click.option(
             '--max-edge-length-m', default=max_edge_length_m, show_default=True, type=POSITIVE,

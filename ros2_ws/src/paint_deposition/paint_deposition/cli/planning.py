@@ -12,7 +12,7 @@ import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import chosen_model, model_for, robot_cell
 from paint_deposition.cli.options import Part, options_of
-from paint_deposition.cli.results import Progress, Results, inputs, results_options, zone_lines
+from paint_deposition.cli.results import Results, inputs, progress, results_options, zone_lines
 from paint_deposition.planning.requests import (
     GunEnvelope,
     ImproveRequest,
@@ -36,9 +36,9 @@ def recommend_command(
     request: IndexRequest, model_file: Path | None, brush: int, results: Results
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
-    chosen = chosen_model(model_file, brush=brush)
-    answer = pd.recommend(chosen.known.model, **dict(request))
-    results.write(answer, model=chosen.known.model, made_from=inputs(model_file=model_file))
+    file, of_model = chosen_model(model_file, brush=brush)
+    answer = pd.recommend(file.model, **dict(request))
+    results.write(answer, model=file.model, made_from=inputs(model_file=model_file))
     lines = [answer.sentence, f'SB50 of one pass: {1e3 * answer.sb50_m:.0f} mm']
     lines += (
         f'minimum: sigma_n {100 * minimum.sigma_n:.2f} % at {1e3 * minimum.index_m:.0f} mm'
@@ -55,7 +55,7 @@ def recommend_command(
             f'standoff by {standoff[0] * 1e3:+.0f} and {standoff[1] * 1e3:+.0f} mm'
         )
     lines += (f'note: {note}' for note in answer.notes)
-    results.print(lines, chosen.words)
+    results.print(lines, of_model)
 
 
 @click.command('plan')
@@ -99,7 +99,8 @@ def plan_command(
 
     With --part-pose the files have their poses in the frame of the robot, base_link by default.
     """
-    chosen, cell = chosen_model(model_file, brush=brush), robot_cell(robot, part_pose)
+    file, of_model = chosen_model(model_file, brush=brush)
+    cell = robot_cell(robot, part_pose)
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
     if faces == 'one' and face_angle_deg is not None:
         raise click.UsageError('--face-angle-deg is for faces; give --faces auto')
@@ -109,7 +110,7 @@ def plan_command(
         if given_it and not (request.optimise or part.zones_file):
             option = name.replace('_', '-')
             raise click.UsageError(f'--{option} is for --optimise; give that too, or leave it out')
-    with Progress('plan') as show:
+    with progress('plan') as show:
         show('reading the mesh')
         surface = part.surface()
         given: dict[str, Any] = {
@@ -118,11 +119,11 @@ def plan_command(
         }  # fmt: skip
         result: pd.Plan | pd.PartPlan
         if faces == 'one':
-            result = pd.plan(surface, chosen.known.model, **given)
+            result = pd.plan(surface, file.model, **given)
         else:
             if face_angle_deg is not None:
                 given['face_angle_deg'] = face_angle_deg
-            result = pd.plan_faces(surface, chosen.known.model, **given)
+            result = pd.plan_faces(surface, file.model, **given)
         show('writing')
         made_from = {
             **inputs(mesh_file=part.mesh, model_file=model_file, zones_file=part.zones_file),
@@ -132,7 +133,7 @@ def plan_command(
             result, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
             paint_moves=paint_moves,
         )  # fmt: skip
-    results.print(_plan_lines(result), chosen.words, surface.notes, result.warnings)
+    results.print(_plan_lines(result), of_model, surface.notes, result.warnings)
 
 
 def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
@@ -205,9 +206,9 @@ def improve_command(
     """
     from paint_deposition.files.motion_files import holds_joints
 
-    with Progress('improve') as show:
+    with progress('improve') as show:
         show('reading')
-        chosen, part_pose = model_for(model_file, trajectory), motion['part_pose']
+        (file, of_model), part_pose = model_for(model_file, trajectory), motion['part_pose']
         robot = {name: motion[name] for name in ('urdf', 'tip_link', 'base_link')}
         limits = {'joint_acceleration': joint_acceleration}
         joints = holds_joints(trajectory)
@@ -218,12 +219,12 @@ def improve_command(
         recorded = pd.read_recording(trajectory, **known)
         show('refining the mesh')
         result = pd.improve(
-            part.surface(), recorded, chosen.known.model, posterior=chosen.known.posterior,
+            part.surface(), recorded, file.model, posterior=file.posterior,
             rivals=[pd.read_model(path) for path in rivals], robot=cell, zones=part.zones(),
             seed=seed, progress=show, **dict(request),
         )  # fmt: skip
         made_from = {
-            **inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=chosen.path,
+            **inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=file.path,
                      zones_file=part.zones_file),
             'rivals': [str(path) for path in rivals], 'part_pose': part_pose,
         }  # fmt: skip
@@ -233,7 +234,7 @@ def improve_command(
             frame_id=recorded.read_in or 'base_link', paint_moves=paint_moves,
         )  # fmt: skip
     notes = (*result.surface.notes, *recorded.notes, *result.notes)
-    results.print(_improvement_lines(result), chosen.words, notes, result.warnings)
+    results.print(_improvement_lines(result), of_model, notes, result.warnings)
 
 
 def _improvement_lines(result: pd.Improvement) -> Iterator[str]:
@@ -309,7 +310,7 @@ def place_command(
         for span, about in zip((x_m, y_m), part_pose[:2], strict=True)
     ]
     x, y = (low + step_m * np.arange(int((high - low) / step_m + 1e-6) + 1) for low, high in spans)
-    with Progress('place') as show:
+    with progress('place') as show:
         show('reading')
         recorded = pd.read_recording(trajectory)
         found = place(recorded, cell, x, y, free_roll, show)

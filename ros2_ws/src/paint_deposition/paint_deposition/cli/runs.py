@@ -15,7 +15,7 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import models_for
-from paint_deposition.cli.results import SHOW_PROGRESS_AFTER_S, Progress, print_all, python
+from paint_deposition.cli.results import SHOW_PROGRESS_AFTER_S, Show, print_all, progress, python
 from paint_deposition.errors import PaintError
 from paint_deposition.report.live_page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 
@@ -89,7 +89,7 @@ def watch_command(
         node = 'from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
         command = python(node, '--ros-args', *(word for value in given for word in ('-p', value)))
         os.execv(command[0], command)
-    with Progress('watch') as show:
+    with progress('watch') as show:
         replay = _replay(show, run, part, model_file, motion, {**dict(band), **pace})
         page = Page(replay.scene, host, port, token, replay.command)
     print_all('warning', replay.warnings)
@@ -104,7 +104,7 @@ def watch_command(
 
 
 def _replay(
-    show: Progress, run: Path, part: options.Part, model_file: Path | None,
+    show: Show, run: Path, part: options.Part, model_file: Path | None,
     motion: dict[str, Any], given: dict[str, float],
 ) -> Replay:  # fmt: skip
     show('loading')
@@ -130,7 +130,7 @@ def _replay(
     chosen = models_for(files, [run], [name for name, _ in guns], named=model_file is not None)
     show('refining the mesh')
     surface = part.surface(Path(mesh))
-    replay = Replay(surface, guns, [one.known.model for one in chosen], **given)
+    replay = Replay(surface, guns, [file.model for file, _ in chosen], **given)
     replay.scene.tell('about', text=f'{run.name} on {Path(mesh).name}')
     return replay
 

@@ -11,7 +11,6 @@ import sys
 import time
 import webbrowser
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
 from importlib import metadata
 from itertools import groupby
 from pathlib import Path
@@ -125,14 +124,9 @@ class _Told:
 KNOWN_FILM_UM = 19.2131
 
 
-@dataclass(frozen=True)
-class Finding:
-    """What was looked at and found; ``ok`` is None where the films do not depend on it."""
-
-    name: str
-    found: str
-    ok: bool | None = None
-    remedy: str = ''
+# What was looked at and found, whether that will do, None where the films do not depend on it, and
+# the remedy.
+Finding = tuple[str, str, bool | None, str]
 
 
 @click.command('doctor')
@@ -143,13 +137,11 @@ def doctor_command(as_json: bool) -> None:
     The self-test paints the sample panel: its mean film is known, and a live film from the same
     poses must equal it to the last bit. Exit code 1 if something essential is missing or wrong.
     """
-    findings = [
-        Finding(
-            'paint',
-            f'{pd.__version__} in {Path(pd.__file__).parent}; Python {platform.python_version()}, '
-            f'{platform.platform(terse=True)} {platform.machine()}',
-        )
-    ]
+    versions = (
+        f'{pd.__version__} in {Path(pd.__file__).parent}; Python {platform.python_version()}, '
+        f'{platform.platform(terse=True)} {platform.machine()}'
+    )
+    findings: list[Finding] = [('paint', versions, None, '')]
     for look in (_libraries, _ros, _processor, _rapid, _known_film):
         try:
             findings += look()
@@ -160,17 +152,18 @@ def doctor_command(as_json: bool) -> None:
             )
             if 'cannot cache' in str(error):
                 remedy = 'set NUMBA_CACHE_DIR to a folder that can be written'
-            findings.append(Finding(name, f'{type(error).__name__}: {error}', False, remedy))
-    well = all(finding.ok is not False for finding in findings)
+            findings.append((name, f'{type(error).__name__}: {error}', False, remedy))
+    well = all(ok is not False for _, _, ok, _ in findings)
     if as_json:
-        found = {'well': well, 'findings': [asdict(one) for one in findings]}
-        click.echo(json.dumps(found, indent=2))
+        keys = ('name', 'found', 'ok', 'remedy')
+        told = [dict(zip(keys, finding, strict=True)) for finding in findings]
+        click.echo(json.dumps({'well': well, 'findings': told}, indent=2))
     else:
         lines = TextWrapper(99, subsequent_indent=' ' * 20, break_on_hyphens=False)
-        for one in findings:
-            mark = {True: 'ok  ', False: 'BAD ', None: '    '}[one.ok]
-            heads = f'{mark}{one.name:<16}', ' ' * 17 + '-> '
-            for head, words in zip(heads, (one.found, one.remedy), strict=True):
+        for name, found, ok, remedy in findings:
+            mark = {True: 'ok  ', False: 'BAD ', None: '    '}[ok]
+            heads = f'{mark}{name:<16}', ' ' * 17 + '-> '
+            for head, words in zip(heads, (found, remedy), strict=True):
                 if words:
                     click.echo(lines.fill(head + words))
         click.echo('all is well' if well else 'paint does not work as it should')
@@ -194,7 +187,7 @@ def _libraries() -> Iterator[Finding]:
         remedy = f'pip install {" ".join(unfit)}' if unfit else ''
         # A marker is that of an extra: extra == "many".
         name, ok = (f'extra {marker[10:-1]}', None) if marker else ('libraries', not unfit)
-        yield Finding(name, ', '.join(found), ok, remedy)
+        yield name, ', '.join(found), ok, remedy
 
 
 def _ros() -> Iterator[Finding]:
@@ -206,12 +199,13 @@ def _ros() -> Iterator[Finding]:
         remedy = (
             'for nodes source ROS 2 Jazzy or newer and the built workspace, or run `make build`'
         )
-        yield Finding('ROS 2', said[-1], None, remedy)
+        yield 'ROS 2', said[-1], None, remedy
         return
     origin = os.environ.get('ROS_DISTRO') or 'from wheels'
     domain = os.environ.get('ROS_DOMAIN_ID', '0')
     reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
-    yield Finding('ROS 2', f'{origin}: {asked.stdout.strip()}; domain {domain}, reach {reach}')
+    found = f'{origin}: {asked.stdout.strip()}; domain {domain}, reach {reach}'
+    yield 'ROS 2', found, None, ''
 
 
 def _processor() -> Iterator[Finding]:
@@ -225,13 +219,12 @@ def _processor() -> Iterator[Finding]:
     named = ('sse4.2', 'avx', 'avx2', 'fma', 'avx512f', 'neon', 'sve')
     features = ' '.join(name for name in named if has.get(name))
     threads = f'{numba.get_num_threads()} threads on {os.cpu_count()} processors'
-    yield Finding('processor', f'{llvm.get_host_cpu_name()}, {features}; {threads}')
+    yield 'processor', f'{llvm.get_host_cpu_name()}, {features}; {threads}', None, ''
     folder = Path(box_distance.stats.cache_path)
     folder = Path(pd.__file__).parent if folder.name == '__pycache__' else folder.parent
     sizes = [file.stat().st_size for file in folder.rglob('*.nb[ic]')]
-    yield Finding(
-        'compiled code', f'for {KIND}: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}'
-    )
+    found = f'for {KIND}: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}'
+    yield 'compiled code', found, None, ''
 
 
 def _rapid() -> Iterator[Finding]:
@@ -239,7 +232,7 @@ def _rapid() -> Iterator[Finding]:
 
     # The package lark-parser puts another lark in the place of the one that is asked for.
     parse_modules('MODULE Try\n  PROC main()\n    PaintL p1, v100;\n  ENDPROC\nENDMODULE', 'Try')
-    yield Finding('RAPID', 'a program is read', True)
+    yield 'RAPID', 'a program is read', True, ''
 
 
 def _known_film() -> Iterator[Finding]:
@@ -254,8 +247,8 @@ def _known_film() -> Iterator[Finding]:
     words = f'{mean_um:.4f} µm, known {KNOWN_FILM_UM} µm, in {seconds:.1f} s'
     remedy = 'this processor or a library computes otherwise: report it with `paint doctor --json`'
     close = abs(mean_um / KNOWN_FILM_UM - 1.0) < 1e-4  # rounding moves it less
-    yield Finding('samples', str(samples))
-    yield Finding('known film', words, close, '' if close else remedy)
+    yield 'samples', str(samples), None, ''
+    yield 'known film', words, close, '' if close else remedy
     live = LiveFilm(film.surface.points(), pd.DepositionModel())
     live.replay(TriggerChange(*told) for told in motion.triggers)
     columns = motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw
@@ -263,4 +256,4 @@ def _known_film() -> Iterator[Finding]:
         live.add_poses(PoseBatch(*(column[row : row + 100] for column in columns)))
     apart = int((live.snapshot().film_um != film.film_um).sum())
     words = f'live film differs from the offline film at {apart} of {len(film.film_um)} vertices'
-    yield Finding('live = offline', words, not apart, remedy if apart else '')
+    yield 'live = offline', words, not apart, remedy if apart else ''

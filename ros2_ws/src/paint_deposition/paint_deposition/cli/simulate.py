@@ -13,10 +13,10 @@ import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import chosen_model, model_for, models_for
 from paint_deposition.cli.results import (
-    Progress,
     Results,
     inputs,
     print_all,
+    progress,
     results_options,
     zone_lines,
 )
@@ -87,7 +87,7 @@ def simulate_command(
     """
     if wet_on_wet and not coats:
         raise click.UsageError('--wet-on-wet has no --coat; name the coats, one for each motion')
-    with Progress('simulate') as show:
+    with progress('simulate') as show:
         show('loading')
         from paint_deposition.files.motion_files import MotionSource, read_gun_motions
         from paint_deposition.request import validate
@@ -102,19 +102,19 @@ def simulate_command(
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(
-            surface, motions, [one.known.model for one in chosen], names=names, coats=coats,
+            surface, motions, [file.model for file, _ in chosen], names=names, coats=coats,
             wet_on_wet=wet_on_wet, readings=readings, max_pose_gap_s=max_pose_gap_s, zones=zones,
             strict=source.strict, progress=show, **dict(band),
         )  # fmt: skip
         made_from = {
             **inputs(mesh_file=part.mesh, zones_file=part.zones_file),
             'trajectory': ', '.join(map(str, trajectories)),
-            'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
+            'model_file': ', '.join(dict.fromkeys(str(m.path) for m, _ in chosen if m.path)),
         }
         show('writing and drawing')
         results.write(film, made_from=made_from)
     notes = (*film.notes, *([readings.understood] if readings else []))
-    words = '; '.join(dict.fromkeys(model.words for model in chosen))
+    words = '; '.join(dict.fromkeys(of_model for _, of_model in chosen))
     results.print(_film_lines(film), words, notes, film.warnings)
 
 
@@ -184,7 +184,7 @@ def sweep_command(sweep: Path, results: Results, scheduler: str | None, count: i
         raise click.UsageError('--workers is for this machine; leave it out beside --scheduler')
     from paint_deposition.batch.sweep import sweep as computed
 
-    with Progress('sweep') as show:
+    with progress('sweep') as show:
         found = computed(sweep, results.output, scheduler=scheduler, count=count, progress=show)
         show('writing and drawing')
         results.write(found)
@@ -283,27 +283,25 @@ def measure_command(
             '--target-um, --speed and --brush are of planned passes, --trajectory gives others; '
             'leave one of them out'
         )
-    with Progress('measure') as show:
+    with progress('measure') as show:
         show('reading')
         surface = part.surface()
         warnings: tuple[str, ...] = ()
         if trajectory is None:
-            chosen = chosen_model(model_file, brush=brush)
-            recorded = pd.plan(
-                surface, chosen.known.model, progress=show, **dict(passes)
-            ).trajectory
+            file, of_model = chosen_model(model_file, brush=brush)
+            recorded = pd.plan(surface, file.model, progress=show, **dict(passes)).trajectory
         else:
-            chosen = model_for(model_file, trajectory)
+            file, of_model = model_for(model_file, trajectory)
             recorded = pd.read_recording(trajectory, **motion)
             warnings = recorded.warnings
         result = pd.choose_readings(
-            surface, recorded, chosen.known.model, posterior=chosen.known.posterior,
+            surface, recorded, file.model, posterior=file.posterior,
             max_pose_gap_s=max_pose_gap_s, progress=show, **dict(request),
         )  # fmt: skip
-        made_from = inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=chosen.path)
+        made_from = inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=file.path)
         show('writing and drawing')
         results.write(result, made_from=made_from, part_pose=motion['part_pose'])
-    results.print(_point_lines(result), chosen.words, result.surface.notes, warnings)
+    results.print(_point_lines(result), of_model, result.surface.notes, warnings)
 
 
 def _point_lines(result: pd.ChosenReadings) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """The coats of a campaign's experiment: which guns laid each, and what its readings are of."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -47,29 +47,26 @@ class CoatEntry(PaintJob):
     )
 
 
-@dataclass(frozen=True)
-class GunMotionFile:
-    """A gun as a campaign names it."""
+# A gun as a campaign names it: the file of its motion, what to read of that, and its brush, where
+# the file names none.
+GunMotion = tuple[str, MotionSource, int | None]
 
-    file: str  # of its motion
-    source: MotionSource  # what to read of it
-    brush: int | None  # where the file names none
 
-    def with_brush(self, path: SprayPath) -> SprayPath:
-        """The path with the brush, or ReadingsError if its file names another."""
-        if self.brush is None:
-            return path
-        others = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, self.brush}
-        if others:
-            raise ReadingsError(
-                f'brush is {self.brush}, and the recording names {listed(others)}; leave it out'
-            )
-        return path.with_(brush=np.full(len(path), self.brush))
+def with_brush(path: SprayPath, brush: int | None) -> SprayPath:
+    """The path with the brush of a campaign, or ReadingsError if its recording names another."""
+    if brush is None:
+        return path
+    others = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, brush}
+    if others:
+        raise ReadingsError(
+            f'brush is {brush}, and the recording names {listed(others)}; leave it out'
+        )
+    return path.with_(brush=np.full(len(path), brush))
 
 
 def laid_coats(
     folder: Path, entry: PaintJob, written: Sequence[Any]
-) -> tuple[Coats, list[GunMotionFile], list[float | None]]:
+) -> tuple[Coats, list[GunMotion], list[float | None]]:
     """The coats that an experiment lists, else the one that it is, and their guns in order.
 
     Then the share of solids in the paint of each coat, None where it is not said.
@@ -84,7 +81,7 @@ def laid_coats(
     called = [coat.name for coat in coats]
     if twice := [name for name in called if called.count(name) > 1]:
         raise ReadingsError(f"two coats are called '{twice[0]}'; rename one, or list guns")
-    guns: list[GunMotionFile] = []
+    guns: list[GunMotion] = []
     names: list[str] = []
     jobs: Sequence[PaintJob] = coats or [entry]
     for coat in jobs:
@@ -153,7 +150,7 @@ def dried(readings: Readings, share: float) -> Readings:
     )  # fmt: skip
 
 
-def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotionFile:
+def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotion:
     """The motion of a gun from what it says itself, its coat, and its experiment."""
     said: dict[str, Any] = {}
     for one in reversed(levels):
@@ -169,4 +166,4 @@ def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotionFile:
     )
     if source.urdf:
         source = source.model_copy(update={'urdf': str(folder / source.urdf)})
-    return GunMotionFile(str(folder / file), source, said.get('brush'))
+    return str(folder / file), source, said.get('brush')

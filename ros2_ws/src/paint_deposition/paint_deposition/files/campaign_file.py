@@ -10,11 +10,18 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.atomic import read_yaml
-from paint_deposition.files.campaign_coats import PaintJob, dried, laid_coats, laid_path, solids_of
+from paint_deposition.files.campaign_coats import (
+    PaintJob,
+    dried,
+    laid_coats,
+    laid_path,
+    solids_of,
+    with_brush,
+)
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.tables.headings import length_of
+from paint_deposition.files.tables.headings import LENGTHS, unit_of
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import TOTAL
@@ -167,16 +174,16 @@ def _read_experiments(
     """One for each layer that was measured; ``zones`` is the file of theirs."""
     files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
     coats, guns, solids = laid_coats(folder, entry, entry.coats)
-    for number, file in enumerate(dict.fromkeys(gun.file for gun in guns), start=1):
+    for number, file in enumerate(dict.fromkeys(file for file, *_ in guns), start=1):
         files['trajectory' if number == 1 else f'trajectory {number}'] = file
     down = None if entry.down is None else np.array(entry.down)
     # Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
     surface = read_mesh(files['mesh'], entry.mesh_scale, 0.02, down, entry.body)
-    trajectories = [read_motion(gun.file, gun.source) for gun in guns]
+    trajectories = [read_motion(file, source) for file, source, _ in guns]
     paths = []
-    for trajectory, gun in zip(trajectories, guns, strict=True):
+    for trajectory, (*_, brush) in zip(trajectories, guns, strict=True):
         path, counts, odd = checked_path(trajectory, entry.max_pose_gap_s)
-        paths.append(gun.with_brush(path))
+        paths.append(with_brush(path, brush))
         for warning in odd:
             remark('warning', name, warning)
         if counts.rejected:
@@ -188,7 +195,7 @@ def _read_experiments(
         remark('warning', name, warning)
     points = None if entry.points is None else folder / entry.points
     layout = Layout(
-        entry.columns, {kind: length_of(unit) or 1.0 for kind, unit in entry.unit.items()},
+        entry.columns, {kind: LENGTHS[unit_of(unit)] for kind, unit in entry.unit.items()},
         {None: '', 'comma': ',', 'point': '.'}[entry.decimal], entry.sheet or '', entry.zero or '',
     )  # fmt: skip
     readings = read_readings(files['measurements'], points, layout, surface)

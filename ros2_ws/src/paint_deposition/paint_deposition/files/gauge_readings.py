@@ -33,7 +33,7 @@ def read_readings(
     """Read gauge readings.
 
     Args:
-        path: CSV, TSV, TXT, JSON, a workbook, or a folder or zip. The project's own columns are
+        path: CSV, TSV, TXT, a workbook, or a folder. The project's own columns are
             ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``, ``group``,
             ``session``, ``layer`` and ``nx,ny,nz``; others are known by usual headings, and the
             layouts of gauges by ``gauge_formats``. Without labels, readings at exactly one place
@@ -251,8 +251,10 @@ def write_predictions(path: str | Path, readings: Readings, predicted_um: np.nda
     kept = [k for k, name in enumerate(names) if name.split(' ')[0] != 'predicted_um']
     numeric = (*AXES, *ON_FACE, *NORMALS, 'sigma', 'thickness')
     words = {k for quantity, at in read.at.items() if quantity not in numeric for k in at}
-    columns = [read.texts(k) if k in words else read.texts_with_points(k) for k in kept]
-    lines = {r: [column[r] for column in columns] for r in sorted({*row.tolist()})}
+    columns = {k: read.texts(k) for k in kept}
+    for k in columns.keys() - words if read.decimal == ',' else ():
+        columns[k] = [t if read.number(t) is None else t.replace(',', '.') for t in columns[k]]
+    lines = {r: [texts[r] for texts in columns.values()] for r in sorted({*row.tolist()})}
     beside = list(dict.fromkeys(read.layers)) or ['']
     for one in beside:
         its = np.ones(len(row), dtype=bool) if one == '' else layer == one
@@ -296,7 +298,16 @@ def _places(
     """Positions (N, 3) of the rows in the mesh frame [m], normals, and their unit in words."""
     if read.has(*AXES):
         positions, words = read.lengths_m(AXES)
-        return positions, _normals(read), words
+        names = [name for name in NORMALS if read.has(name)]
+        if not names:
+            return positions, None, words
+        if len(names) < len(NORMALS):
+            raise read.error(f'has {", ".join(names)} only; give all of nx,ny,nz or none')
+        normals = np.column_stack([read.numbers(read.at[name][0]) for name in names])
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        for row in np.flatnonzero(lengths < 1e-6):
+            read.add_error(row, 'the normal nx,ny,nz has length zero')
+        return positions, normals / np.where(lengths < 1e-6, 1.0, lengths), words
     if read.has(*ON_FACE):
         if surface is None:
             raise read.error(
@@ -325,16 +336,3 @@ def _places(
         f'the readings have no coordinates {shown(read.headings)}; give x, y, z, or a list of '
         'measuring points (points: in a campaign, else --points)'
     )
-
-
-def _normals(read: ReadingTable) -> np.ndarray | None:
-    names = [name for name in NORMALS if read.has(name)]
-    if not names:
-        return None
-    if len(names) < len(NORMALS):
-        raise read.error(f'has {", ".join(names)} only; give all of nx,ny,nz or none')
-    normals = np.column_stack([read.numbers(read.at[name][0]) for name in names])
-    lengths = np.linalg.norm(normals, axis=1)
-    for row in np.flatnonzero(lengths < 1e-6):
-        read.add_error(row, 'the normal nx,ny,nz has length zero')
-    return normals / np.where(lengths < 1e-6, 1.0, lengths)[:, np.newaxis]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import zipfile
 from io import BytesIO
 from itertools import repeat
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paint_deposition.errors import MeshError, did_you_mean, some
-from paint_deposition.files.atomic import replacing, require_file, require_small_package
+from paint_deposition.files.atomic import replacing, require_file
 from paint_deposition.part.edges import matched_half_edges, weld
 from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
@@ -21,11 +20,10 @@ from paint_deposition.part.surface import Surface
 if TYPE_CHECKING:
     from trimesh import Scene
 
-# Suffixes by kind. Of those in the second row the unit is known.
+# Suffixes by kind. Those in the second row are read in metres.
 PLAIN = ('.stl', '.ply', '.obj')
-WITH_UNIT = ('.gltf', '.glb', '.3mf', '.step', '.stp')
+WITH_UNIT = ('.gltf', '.glb', '.step', '.stp')
 SUFFIXES = (*PLAIN, *WITH_UNIT)
-METRES = {'micron': 1e-6, 'millimeter': 1e-3, 'centimeter': 1e-2, 'inch': 0.0254, 'foot': 0.3048}
 STEP_READER = 'cascadio'
 # A binary STL: 80 bytes of anything, the number of triangles, and each with its normal.
 STL_HEAD = 84
@@ -51,9 +49,9 @@ def read_mesh(
     are turned to the majority, both with a note in ``Surface.notes``.
 
     Args:
-        path: STL, PLY, OBJ, glTF (.gltf, .glb), 3MF or STEP (.step, .stp).
-        scale: metres per unit of the file, 0.001 for millimetres; with glTF, 3MF and STEP on top
-            of the unit that they have.
+        path: STL, PLY, OBJ, glTF (.gltf, .glb) or STEP (.step, .stp).
+        scale: metres per unit of the file, 0.001 for millimetres; with glTF and STEP on top of
+            the unit that they have.
         max_edge_length_m: longest edge after refinement [m].
         down: gravity in the mesh frame; default: -z, or -y if it is drawn flat at z = 0.
         body: name of the one body to take of several; default: all as one part, with a note.
@@ -88,7 +86,7 @@ def read_triangles(
         )
     if not path.exists() or path.is_dir():
         raise MeshError(f'{path}: no such mesh file; check the path')
-    (vertices, faces), unit_m, notes, count = read_bodies(path, body)
+    (vertices, faces), notes, count = read_bodies(path, body)
     if not len(faces):
         raise MeshError(f'{path}: holds no triangles; export the surface as a triangle mesh')
     if faces.min() < 0 or faces.max() >= len(vertices):
@@ -101,8 +99,8 @@ def read_triangles(
         raise MeshError(
             f'{path}: {wrong} of {len(vertices)} vertices are not finite; export it again'
         )
-    if unit_m * scale != 1.0:
-        vertices = vertices.astype(np.float64) * (unit_m * scale)
+    if scale != 1.0:
+        vertices = vertices.astype(np.float64) * scale
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
     extent = float(box_extent_m(vertices if used.all() else vertices[used]).max())
@@ -159,12 +157,11 @@ def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np
     return np.ascontiguousarray(faces)
 
 
-def read_bodies(path: Path, body: str | None = None) -> tuple[Body, float, list[str], int]:
+def read_bodies(path: Path, body: str | None = None) -> tuple[Body, list[str], int]:
     """All bodies of a file as one mesh, or the one of a name (object, solid, node or part).
 
-    With the metres of its unit, 1 where the file has none, what was understood, for the user, and
-    how many bodies it is of. Raises MeshError, saying what to do, for what is no mesh or has no
-    such body.
+    With what was understood, for the user, and how many bodies it is of. Raises MeshError, saying
+    what to do, for what is no mesh or has no such body.
     """
     require_file(path, MeshError)
     kind = path.suffix.lower()
@@ -177,15 +174,17 @@ def read_bodies(path: Path, body: str | None = None) -> tuple[Body, float, list[
             if body not in (None, path.stem):
                 raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, [path.stem])}')
             corners = np.fromfile(path, STL_TRIANGLE, offset=STL_HEAD)['corners']
-            return (corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3)), 1.0, [], 1
+            return (corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3)), [], 1
     scene = _scene(path, kind)
     found = _by_name(path, scene)
     if len(found) == 1 and not {*found} & {body}:  # the only one also has the name of its file
         found = {path.stem: next(iter(found.values()))}
-    notes, unit_m = [], 1.0
+    notes = []
     if kind in WITH_UNIT:
-        unit_m, unit_words = _unit(path, kind, scene)
-        notes.append(f'{path.name}: {unit_words}')
+        unit = 'glTF, in metres by its standard'
+        if kind in ('.step', '.stp'):
+            unit = 'STEP, its unit converted to metres'
+        notes.append(f'{path.name}: {unit}')
     if body is not None:
         if body not in found:
             raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, found)}')
@@ -202,7 +201,7 @@ def read_bodies(path: Path, body: str | None = None) -> tuple[Body, float, list[
     first = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
     faces = [faces + start for (_, faces), start in zip(bodies, first, strict=False)]
     whole = np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
-    return whole, unit_m, notes, len(bodies)
+    return whole, notes, len(bodies)
 
 
 def _scene(path: Path, kind: str) -> Scene:
@@ -226,12 +225,6 @@ def _scene(path: Path, kind: str) -> Scene:
         options['resolver'] = trimesh.resolvers.FilePathResolver(str(path))
     else:
         source = str(path)
-    if kind == '.3mf':
-        try:
-            with zipfile.ZipFile(path) as package:
-                require_small_package(package)
-        except zipfile.BadZipFile as error:
-            raise MeshError(f'{path}: not readable as a mesh ({error}); export it again') from None
     if kind in ('.step', '.stp'):
         if importlib.util.find_spec(STEP_READER) is None:
             raise MeshError(
@@ -266,21 +259,6 @@ def _by_name(path: Path, scene: Scene) -> dict[str, Body]:
             vertices = vertices @ pose[:3, :3].T + pose[:3, 3]
         found[str(node)] = vertices, faces
     return dict(sorted(found.items()))  # the library gives them in any order
-
-
-def _unit(path: Path, kind: str, scene: Scene) -> tuple[float, str]:
-    """Metres to the unit of a file that has one, and how that was understood."""
-    if kind in ('.gltf', '.glb'):
-        return 1.0, 'glTF, in metres by its standard'
-    if kind in ('.step', '.stp'):
-        return 1.0, 'STEP, its unit converted to metres'
-    name = str(scene.metadata.get('units') or scene.units or 'millimeter').lower()
-    singular = name.removesuffix('s').replace('inche', 'inch').replace('feet', 'foot')
-    if singular in ('meter', 'm'):
-        return 1.0, '3MF, in metres'
-    if singular not in METRES:
-        raise MeshError(f'{path}: its unit is {name!r}; export it in millimetres')
-    return METRES[singular], f'3MF in {singular}, converted to metres'
 
 
 def write_mesh_ply(

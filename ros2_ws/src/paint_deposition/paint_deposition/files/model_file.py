@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -63,6 +63,7 @@ class ModelFile:
 
     ``uncertainty`` are standard deviations in the sections of the model, ``history`` what was
     added and why, oldest first, ``posterior`` what the fit behind it knows of its parameters.
+    ``path`` is that of its file, None for a model without.
     """
 
     model: DepositionModel
@@ -70,6 +71,7 @@ class ModelFile:
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
     history: Sequence[Mapping[str, Any]] = ()
     posterior: Posterior | None = None
+    path: Path | None = None
 
 
 def read_model(path: str | Path, load_effect: LoadEffect = load_effect_file) -> DepositionModel:
@@ -88,7 +90,8 @@ def read_model_file(path: str | Path, load_effect: LoadEffect = load_effect_file
     path = Path(path)
     content = read_yaml(path, 'model', ModelError)
     try:
-        return _model_file(content, lambda name: load_effect(path.parent / name))
+        file = _model_file(content, lambda name: load_effect(path.parent / name))
+        return replace(file, path=path)
     except ModelError as error:
         raise ModelError(f'{path}: {error}') from None
 

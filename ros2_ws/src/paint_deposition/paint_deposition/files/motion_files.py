@@ -156,10 +156,7 @@ def holds_joints(path: Path) -> bool:
 def read_table(path: Path, source: MotionSource) -> Trajectory:
     """The motion in a table, in the frame of its poses."""
     source.require_kind(path, 'a table of poses')
-    return read_pose_table(
-        path, _robot(path, source), source.state_topic, source.pose_unit, source.rotation,
-        source.angle_unit,
-    )  # fmt: skip
+    return read_pose_table(path, source, _robot(path, source))
 
 
 def read_gun_motions(

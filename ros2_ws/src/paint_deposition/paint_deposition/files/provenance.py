@@ -15,8 +15,7 @@ from paint_deposition import __version__, git_version
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.atomic import BLOCK_BYTES, json_text, plain, read_file, require_file
-from paint_deposition.files.effect_file import load_unnamed_effect_file
-from paint_deposition.files.model_file import ModelFile, model_source, read_model_file
+from paint_deposition.files.model_file import model_source
 from paint_deposition.files.rapid.program import is_rapid
 from paint_deposition.files.recordings.bag_files import custom_data
 
@@ -118,9 +117,3 @@ def planned_model(motion: Path) -> tuple[Path, str] | None:
         found = re.search(pattern, text, re.IGNORECASE)
         return (folder / MODEL_FILE, found[1]) if found else None
     return None
-
-
-def model_of_plan(path: Path, digest: str) -> ModelFile | None:
-    """The model in a file, if it is still that of the plan."""
-    file = read_model_file(path, load_unnamed_effect_file) if path.is_file() else None
-    return file if file and model_digest(file.model) == digest else None

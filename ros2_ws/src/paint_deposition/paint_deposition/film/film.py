@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -119,21 +119,6 @@ class Film(Tabular):
         columns['thickness_um'] = self.film_um
         columns |= {f'{coat.name}_um': coat.film_um for coat in self.coats}
         return columns | ({'zone': self.zones.names} if self.zones else {})
-
-    def short_table(self) -> list[Sequence[Any]]:
-        """The film on the part and on each zone."""
-        rows = {'part': self.statistics, **self.statistics.zones}
-        return [
-            ('', 'mean [µm]', 'SD [µm]', 'least [µm]', 'greatest [µm]', 'painted', 'in the band'),
-            *(
-                (
-                    name, f'{s.mean_um:.1f}', f'{s.std_dev_um:.1f}', f'{s.min_um:.1f}',
-                    f'{s.max_um:.1f}', f'{s.coverage:.0%}',
-                    f'{s.within_target:.0%}' if s.has_target else '',
-                )
-                for name, s in rows.items()
-            ),
-        ]  # fmt: skip
 
     @property
     def trajectory(self) -> Trajectory:

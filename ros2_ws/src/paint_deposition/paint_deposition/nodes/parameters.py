@@ -194,7 +194,7 @@ def atomizers_parameter(what_they_do: str) -> NodeParameter:
 def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
     """The rows that describe a part's mesh, with this default for `max_edge_length_m`."""
     return {
-        'mesh_file': NodeParameter('', "The part's mesh: STL, PLY, OBJ, glTF, 3MF or STEP [path]"),
+        'mesh_file': NodeParameter('', "The part's mesh: STL, PLY, OBJ, glTF or STEP [path]"),
         'mesh_scale': NodeParameter(
             1.0, 'Metres for one unit of the mesh file; 0.001 for a mesh in mm [m]', (1e-9, 1e3)
         ),

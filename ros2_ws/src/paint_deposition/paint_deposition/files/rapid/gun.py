@@ -77,7 +77,7 @@ class Gun(Interpreter):
         self.planes: list[tuple[int, float, int, int]] = []
 
     def do_setbrush(self, i: Instruction) -> None:
-        brush = self._brush_number(i, 0)
+        brush = int(self._set_to(i, 'brush', 0))
         if not i.options:
             self.brush = brush
             return
@@ -148,13 +148,13 @@ class Gun(Interpreter):
         return self.number(i.values[index], f'what {i.name} takes')
 
     def _set_to(self, i: Instruction, what: str, index: int) -> float:
-        return self.argument(i, index) if what == 'flow' else self._brush_number(i, index)
-
-    def _brush_number(self, i: Instruction, index: int) -> int:
+        """What an instruction sets the flow, or the brush, to."""
         number = self.argument(i, index)
-        if not (0 <= number <= MOST and number == round(number)):
-            self.fail(f'{i.name} takes the number of a brush, not {number:g}')
-        return int(number)
+        if what == 'brush':
+            if not (0 <= number <= MOST and number == round(number)):
+                self.fail(f'{i.name} takes the number of a brush, not {number:g}')
+            return int(number)
+        return number
 
     @property
     def spray(self) -> dict[str, Any]:

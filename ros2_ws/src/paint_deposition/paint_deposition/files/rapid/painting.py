@@ -150,7 +150,7 @@ class Painting(Gun):
             self.fail(f'tool {its_tool} stands still; only tools the robot holds are read')
         stop, radius_mm, *_ = self._record(self.known(zone), 'zonedata')
         zone_m = 0.0 if stop else self.number(radius_mm, 'the radius of the zone') * 1e-3
-        speed_m_per_s, duration_s = self._speed_m_per_s(i, speed), self._duration_s(i)
+        speed_m_per_s, duration_s = self._pace(i, speed)
         if duration_s and 0.0 < length_m < FROM_UNKNOWN_M:
             speed_m_per_s = length_m / duration_s
         self.program.moves.append(RapidMove(
@@ -189,25 +189,23 @@ class Painting(Gun):
         )
         return unit, self._frame(own)
 
-    def _duration_s(self, i: Instruction) -> float:
-        """How long a move takes, 0 where its speed says so."""
-        if 't' not in i.options:
-            return 0.0
-        duration_s = self.number(i.options['t'], 'the duration')
-        if not duration_s > 0.0:
-            self.fail(f'a duration of {duration_s:g} s; give one above 0')
-        if not self._speed_share > 0.0:
-            self.fail(f'a speed of {self._speed_share:.0%} by VelSet; give one above 0')
-        return duration_s / self._speed_share
-
-    def _speed_m_per_s(self, i: Instruction, node: object) -> float:
+    def _pace(self, i: Instruction, node: object) -> tuple[float, float]:
+        """The speed of a move [m/s], and how long it takes [s], 0 where its speed says so."""
         if 'v' in i.options:
             speed = self.number(i.options['v'], 'the speed')
         else:
             if name_of(node) == 'vmax':
                 self.program.note("vmax is the robot's own; 5 m/s assumed")
             speed = self.number(self._record(self.known(node), 'speeddata')[0], 'the speed')
-        return min(speed * self._speed_share, self._fastest_mm_per_s) * 1e-3
+        speed_m_per_s = min(speed * self._speed_share, self._fastest_mm_per_s) * 1e-3
+        if 't' not in i.options:
+            return speed_m_per_s, 0.0
+        duration_s = self.number(i.options['t'], 'the duration')
+        if not duration_s > 0.0:
+            self.fail(f'a duration of {duration_s:g} s; give one above 0')
+        if not self._speed_share > 0.0:
+            self.fail(f'a speed of {self._speed_share:.0%} by VelSet; give one above 0')
+        return speed_m_per_s, duration_s / self._speed_share
 
     def _record(self, value: object, kind: str) -> list:
         if not isinstance(value, list) or len(value) != len(RECORDS[kind]):

@@ -130,19 +130,15 @@ class _Builder(Transformer):
         return [parameter for parameter in parameters if parameter]
 
     def routine(self, *parts: Any) -> Routine:
-        return _routine(parts, True)
+        names = [str(part) for part in parts if isinstance(part, str)]
+        parameters = next((part for part in parts if isinstance(part, list)), [])
+        body = next(part for part in parts if isinstance(part, Node) and part.rule == 'block')
+        return Routine(names[-1], parameters, body, '', True)
 
     def function(self, *parts: Any) -> Routine:
-        return _routine(parts, False)
+        return self.routine(*parts)._replace(is_procedure=False)
 
     trap = function
-
-
-def _routine(parts: tuple[Any, ...], is_procedure: bool) -> Routine:
-    names = [str(part) for part in parts if isinstance(part, str)]
-    parameters = next((part for part in parts if isinstance(part, list)), [])
-    body = next(part for part in parts if isinstance(part, Node) and part.rule == 'block')
-    return Routine(names[-1], parameters, body, '', is_procedure)
 
 
 def line_of(token: Token) -> int:

@@ -115,10 +115,6 @@ def _pose_mult(first: list, second: list) -> list:
     return [position.tolist(), _wxyz(rotation)]
 
 
-def _to_digits(to_whole: Callable[[float], float]) -> Callable:
-    return lambda value, dec=0.0: to_whole(value * 10.0**dec) / 10.0**dec
-
-
 def _of_vectors(calculate: Callable) -> Callable:
     """An operator that takes positions too."""
 
@@ -142,8 +138,8 @@ OPERATORS: dict[str, Callable] = {
 }  # fmt: skip
 FUNCTIONS: dict[str, Callable] = {
     'abs': abs, 'sqrt': math.sqrt, 'pow': math.pow,
-    'round': _to_digits(lambda a: math.copysign(math.floor(abs(a) + 0.5), a)),
-    'trunc': _to_digits(math.trunc),
+    'round': lambda a, dec=0.0: math.copysign(math.floor(abs(a) * 10.0**dec + 0.5), a) / 10.0**dec,
+    'trunc': lambda a, dec=0.0: math.trunc(a * 10.0**dec) / 10.0**dec,
     'sin': lambda a: math.sin(math.radians(a)), 'cos': lambda a: math.cos(math.radians(a)),
     'tan': lambda a: math.tan(math.radians(a)), 'atan': lambda x: math.degrees(math.atan(x)),
     'atan2': lambda y, x: math.degrees(math.atan2(y, x)),

@@ -81,13 +81,12 @@ class Bag:
         counts: Counter[tuple[str, str]] = Counter()
         for connection in reader.connections:
             counts[connection.topic, connection.msgtype] += connection.msgcount
-        told = _information(path)
-        self.custom_data, named = _custom(told), _named_files(told)
+        self.custom_data, names = _metadata(path)
         kept = self.custom_data.get(KEPT, '').split()
         self.warnings: tuple[str, ...] = ()
         self.skipped: Counter[str] = Counter()
-        if path.name in named[:-1] or path.name in named[1:]:
-            several = f'{path.name} is one of the {len(named)} files of a split bag'
+        if names and len(names) > 1 and path.name in names:
+            several = f'{path.name} is one of the {len(names)} files of a split bag'
             self.warnings = (f'{several}; give its folder, {path.parent}, for all of it',)
         self._kept = {name: int(n) for name, _, n in (entry.partition('=') for entry in kept)}
         # Sorted by name, topics without messages included.
@@ -248,18 +247,13 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
 
 def custom_data(path: Path) -> dict[str, str]:
     """The custom data in the metadata.yaml of a rosbag2 folder, or of one of its files."""
-    return _custom(_information(path))
+    return _metadata(path)[0]
 
 
-def _custom(information: dict[str, Any]) -> dict[str, str]:
-    told = information.get('custom_data')
-    return {str(key): str(value) for key, value in told.items()} if isinstance(told, dict) else {}
+def _metadata(path: Path) -> tuple[dict[str, str], list[str] | None]:
+    """Custom data, and the names of the files as they are when they are expanded, None if unsaid.
 
-
-def _information(path: Path) -> dict[str, Any]:
-    """What the metadata.yaml of a rosbag2 folder says, or beside a file one that names it.
-
-    Nothing where it cannot be read.
+    They are those in a rosbag2 folder, or beside a file if they name it; none if unreadable.
     """
     folder = path if path.is_dir() else path.parent
     try:
@@ -268,15 +262,15 @@ def _information(path: Path) -> dict[str, Any]:
         metadata = yaml.load(text, Loader=getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
         told = dict(metadata['rosbag2_bagfile_information'])
     except Exception:  # damaged, or no bag, which reading it reports
-        return {}
-    return told if path.is_dir() or path.name in _named_files(told) else {}
-
-
-def _named_files(information: dict[str, Any]) -> list[str]:
-    """The names of the files of a bag, in order, as they are when they are expanded."""
-    listed = information.get('relative_file_paths')
-    named = listed if isinstance(listed, list) else []
-    return [Path(str(name)).name.removesuffix('.zstd') for name in named]
+        return {}, None
+    listed, custom = told.get('relative_file_paths'), told.get('custom_data')
+    names = None
+    if isinstance(listed, list):
+        names = [Path(str(name)).name.removesuffix('.zstd') for name in listed]
+    if not (path.is_dir() or path.name in (names or ())):
+        return {}, None
+    known = custom if isinstance(custom, dict) else {}
+    return {str(key): str(value) for key, value in known.items()}, names
 
 
 def mcap_files(path: Path) -> list[Path]:
@@ -323,9 +317,8 @@ def _require_bag(path: Path) -> None:
     if path.is_dir() and not (path / 'metadata.yaml').is_file():
         unfinished = unfinished or 'it has no metadata.yaml'
     # A recorder that splits its bag and is killed has not named the last file yet.
-    told = _information(path)
-    known = isinstance(told.get('relative_file_paths'), list)
-    others = stored - {*_named_files(told)} if known else set()
+    _, known = _metadata(path)
+    others = set() if known is None else stored - {*known}
     if path.is_dir() and others:
         named = ', '.join(sorted(others))
         unfinished = unfinished or f'its metadata.yaml does not name {named}'

@@ -41,6 +41,8 @@ STATE_TOPIC = '/atomizer/state'
 JOINT_TRAJECTORY_TYPE = 'trajectory_msgs/msg/JointTrajectory'
 JOINT_TOPIC = '/joint_trajectory'
 BOOL_TYPE = 'std_msgs/msg/Bool'
+# Of triggers; the first says more.
+STATE_TYPES = STATE_TYPE, BOOL_TYPE
 # Fields of AtomizerState that are summarised while the gun sprays.
 SETTINGS = ('flow', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
 # A change of the trigger: its time, flow and brush from then on, and when it was logged [ns].
@@ -75,7 +77,7 @@ def trajectory_of(
     trajectory, log_times_ns = motion_of(bag, pose_topic, tf, robot, pose_unit)
     if not state_topic:
         # AtomizerState is listed first, since a Bool may be anything.
-        unused = [t for t in bag.topics_of(STATE_TYPE, BOOL_TYPE) if t.message_count]
+        unused = [t for t in bag.topics_of(*STATE_TYPES) if t.message_count]
         if not unused:
             return trajectory
         named = ' and '.join(f'{topic.name} ({topic.type})' for topic in unused)
@@ -119,11 +121,6 @@ def motion_of(
     return replace(read, warnings=(*read.warnings, *faults)), log_times_ns
 
 
-def choose_state_topic(bag: Bag, name: str) -> BagTopic:
-    """The named topic of a bag, AtomizerState or Bool."""
-    return bag.choose(name, (STATE_TYPE, BOOL_TYPE), 'state')
-
-
 def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarray) -> Trajectory:
     """The motion, logged at (N,) int64, with the trigger of a topic.
 
@@ -134,9 +131,9 @@ def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarr
     """
     signal, settings = Signal.parse(name), dict[str, float]()
     topic = bag.find(signal.topic) if signal else None
-    is_state = topic is not None and topic.type in (STATE_TYPE, BOOL_TYPE)
+    is_state = topic is not None and topic.type in STATE_TYPES
     if signal is None or topic is None or (is_state and signal == Signal(signal.topic, '')):
-        topic = choose_state_topic(bag, name)
+        topic = bag.choose(name, STATE_TYPES, 'state')
         by_log_time = topic.type == BOOL_TYPE
         changes, settings, notes = _changes_of_states(bag, topic)
     else:

@@ -138,9 +138,6 @@ def joint_streams(decoded: Iterable[tuple[str, int, Any]]) -> tuple[JointStreams
     return streams, without
 
 
-PLACED = ('translation', 'rotation')
-
-
 def stamp_ns(header: Any) -> int:
     """A header's stamp in integer nanoseconds; 0 is none, or one that is no time of ROS."""
     return nanoseconds(header.stamp.sec, header.stamp.nanosec)
@@ -157,8 +154,9 @@ def pose_of(message: Any) -> tuple[np.ndarray, np.ndarray]:
 
     They are NaN where one is infinite or further off than any part.
     """
-    kind = ('position', 'orientation') if hasattr(message, 'position') else PLACED
-    p, q = (getattr(message, name) for name in kind)
+    is_pose_message = hasattr(message, 'position')
+    p = message.position if is_pose_message else message.translation
+    q = message.orientation if is_pose_message else message.rotation
     values = np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
     if not (np.abs(values) <= FARTHEST_M).all():
         values[:] = np.nan

@@ -1,8 +1,7 @@
 """The poses of a recording: of a topic, or by its transforms, /tf_static, part_pose and /tf."""
 
-import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -163,14 +162,12 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
 
 
 POSE_TYPE = 'geometry_msgs/msg/PoseStamped'
-ARRAY_TYPE = 'geometry_msgs/msg/PoseArray'
-# The pose, or the poses of an array, in a message of each type.
+# The pose in a message of each type.
 POSES: dict[str, Callable[[Any], Any]] = {
     POSE_TYPE: lambda message: message.pose,
     'geometry_msgs/msg/PoseWithCovarianceStamped': lambda message: message.pose.pose,
     'nav_msgs/msg/Odometry': lambda message: message.pose.pose,
     PART_POSE_TYPE: lambda message: message.transform,
-    ARRAY_TYPE: lambda message: message.poses,
 }
 
 
@@ -196,27 +193,10 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
             others = f'; it has {" and ".join(moves)}' if moves else ''
             raise RecordingError(f'{bag.path}: name a pose topic; {listed}{others}')
         name = candidates[0].name
-    topic = bag.choose(_element(name)[0], tuple(POSES), kind)
+    topic = bag.choose(name, tuple(POSES), kind)
     if topic.message_count == 0:
         raise RecordingError(f'{topic.name} in {bag.path} has no messages; record it again')
     return topic
-
-
-def _element(name: str) -> tuple[str, int | None]:
-    """The topic and the number of '/poses[2]'."""
-    element = re.fullmatch(r'(.*)\[(\d+)\]', name)
-    return (element[1], int(element[2])) if element else (name, None)
-
-
-def _one_of(poses: Sequence[Any], number: int | None, topic: str) -> Any:
-    """The pose of this number in an array, or its only one."""
-    if number is None and len(poses) != 1:
-        raise RecordingError(
-            f'{topic} has {len(poses)} poses in a message; name the one of the gun, as {topic}[0]'
-        )
-    if (number or 0) >= len(poses):
-        raise RecordingError(f'{topic} has {len(poses)} poses in a message, and none [{number}]')
-    return poses[number or 0]
 
 
 def read_poses(bag: Bag, name: str | None) -> tuple[Trajectory, np.ndarray, str]:
@@ -226,17 +206,13 @@ def read_poses(bag: Bag, name: str | None) -> tuple[Trajectory, np.ndarray, str]
     each. Raises RecordingError for several bodies, or if all poses have one stamp.
     """
     topic = choose_pose_topic(bag, name)
-    number = _element(name or '')[1]
     stamps, log_times, rows = [], [], []
     frames: list[str] = []
     bodies: Counter[str] = Counter()
     for _, log_time_ns, message in bag.decoded([topic.name]):
-        pose = POSES[topic.type](message)
-        if topic.type == ARRAY_TYPE:
-            pose = _one_of(pose, number, topic.name)
         stamps.append(stamp_ns(message.header))
         log_times.append(log_time_ns)
-        rows.append(np.concatenate(pose_of(pose)))
+        rows.append(np.concatenate(pose_of(POSES[topic.type](message))))
         frames.append(message.header.frame_id.lstrip('/'))
         bodies[message.child_frame_id if topic.type == PART_POSE_TYPE else ''] += 1
     if len(rows) != topic.message_count:

@@ -87,21 +87,11 @@ class Heading:
             return Heading(text, tuple(w for w in words[:-1] if w != 'in'), SHORT[words[-1]])
         return Heading(text, words)
 
-    @property
-    def unit_m(self) -> float | None:
-        """Metres in its unit, None where it has no unit of length."""
-        return LENGTHS.get(self.unit)
-
 
 def words_of(text: str) -> tuple[str, ...]:
     """The words of a text, small and without accents; '#' counts as one."""
     spaced = re.sub(r'(?<=[\u3040-\u9fff])(?=\d)', ' ', _small(text))  # 測定値1
     return tuple(re.findall(r'[^\W_]+|#', spaced))
-
-
-def length_of(text: str) -> float | None:
-    """Metres in a unit of length that stands alone, None where it is none."""
-    return LENGTHS.get(_small(text).strip(' .[]()'))
 
 
 def unit_of(text: str) -> str:

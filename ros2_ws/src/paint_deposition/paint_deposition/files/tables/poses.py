@@ -27,11 +27,12 @@ from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.stream_quality import FARTHEST_PART_M, StreamQuality
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered, relative_flow
+from paint_deposition.request import MotionOptions
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
 
-SUFFIXES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods')
+SUFFIXES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls')
 # Names of columns, as `column_name` leaves them.
 TIME = ('time', 'timestamp', 'stamp', 'timefromstart', 'elapsed', 'zeit', 't')
 TRIGGER = ('spraying', 'trigger', 'gun', 'gunon', 'on', 'spray', 'sprayon', 'paint', 'painton')
@@ -71,40 +72,28 @@ def holds_readings(path: Path, points_given: bool) -> bool:
 
 
 def read_pose_table(
-    path: Path,
-    robot: 'Robot | None' = None,
-    trigger: str | None = None,
-    pose_unit: str | None = None,
-    rotation: str | None = None,
-    angle_unit: str | None = None,
+    path: Path, options: MotionOptions, robot: 'Robot | None' = None
 ) -> Trajectory:
     """The motion in a table, with what was understood as a note.
 
     A table with times holds poses as recorded, or with ``robot`` its joints; one with speeds,
-    passes as programmed, such as ``passes.csv``.
-
-    Args:
-        trigger: heading of the column that opens the gun; None: found, as are the others.
-        rotation: one of ROTATION_WORDS.
-        pose_unit, angle_unit: for headings without.
+    passes as programmed, such as ``passes.csv``. Of the options the trigger is the heading of the
+    column that opens the gun, which else is found, and units are for headings without.
 
     Raises:
         RecordingError: naming the file, the column and the remedy.
     """
     table = PoseTable.read(path, robot)
     try:
-        return _motion(table, robot, trigger, pose_unit, (rotation, angle_unit))
+        return _motion(table, robot, options)
     except RecordingError as error:
         reason = str(error).removeprefix(f'{path}: ')
         raise RecordingError(f'{path}: {reason}') from None
 
 
-def _motion(
-    table: PoseTable, robot: 'Robot | None', trigger: str | None, pose_unit: str | None,
-    angles: tuple[str | None, str | None],
-) -> Trajectory:  # fmt: skip
+def _motion(table: PoseTable, robot: 'Robot | None', options: MotionOptions) -> Trajectory:
     """The poses with their times or speeds, and with what switches the gun."""
-    flows, by_trigger = _flows(table, trigger)
+    flows, by_trigger = _flows(table, options.state_topic)
     brushes, by_brush = _brushes(table)
     if flows is None and brushes.any():
         flows = np.ones(len(brushes))
@@ -122,8 +111,8 @@ def _motion(
         poses = robot.trajectory(stamps, joints, recorded, table.path.name)
         (how,) = poses.notes
     else:
-        positions, its_unit = _positions_m(table, pose_unit)
-        quaternions, its_rotation = read_rotations(table, *angles)
+        positions, its_unit = _positions_m(table, options.pose_unit)
+        quaternions, its_rotation = read_rotations(table, options.rotation, options.angle_unit)
         poses = Trajectory(stamps, positions, quaternions, _frame(table))
         how = f'{len(table)} poses: x y z in {its_unit}; {its_rotation}'
     note = f'{how}; {by_trigger}{by_brush}'

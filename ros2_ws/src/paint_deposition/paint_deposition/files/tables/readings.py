@@ -1,6 +1,6 @@
 """Tables of gauge readings and of measuring points: their rows, units and numbers."""
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
@@ -11,12 +11,13 @@ import numpy as np
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.tables.gauge_formats import ALIASES, STATISTIC
 from paint_deposition.files.tables.headings import (
+    LENGTHS,
     UNIT_NAMES,
     Heading,
     find_table,
     headings_in,
-    length_of,
     rows_below,
+    unit_of,
     words_of,
 )
 from paint_deposition.files.tables.reading_columns import (
@@ -80,10 +81,7 @@ class ReadingTable(Table):
         thick = table.at['thickness'] if films else []
         table.layers = layers_of(table.headings, layout, thick)
         refuse_misleading(table, table.at, layout, table.layers, bare)
-        # The cells: one reading in each, its unit in the heading, and n/a for what is none.
-        if films and not table.layers:
-            table, thick = table.with_repeats_apart(thick)
-            table.at['thickness'] = thick
+        # The cells: their unit in the heading, and n/a for what is no reading.
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in table.at.get(q, [])]
         numeric += thick
         table = table.without_units_in_cells(numeric).with_decimal(numeric, layout.decimal)
@@ -209,7 +207,7 @@ class ReadingTable(Table):
         """Metres in the unit of the thickness that a column, or a line above the table, has."""
         if self.has('unit'):
             texts = sorted({*self.of('unit')} - {''})
-            units = {length_of(text) for text in texts}
+            units = {LENGTHS.get(unit_of(text)) for text in texts}
             if len(units) > 1 or not units <= {*FILM_UNITS}:
                 found = ', '.join(map(repr, texts))
                 raise self.error(f'the thickness is in {found}; give all of it in µm, mil or mm')
@@ -217,7 +215,7 @@ class ReadingTable(Table):
         for row in sheet.rows[:header]:
             cells = [part for cell in row for part in text_of(cell).split(':') if part]
             if len(cells) > 1 and ' '.join(words_of(cells[0])) in ALIASES['unit']:
-                return length_of(cells[1])
+                return LENGTHS.get(unit_of(cells[1]))
         return None
 
     def has(self, *quantities: str) -> bool:
@@ -261,8 +259,8 @@ class ReadingTable(Table):
         values = np.column_stack([self.numbers(column) for column in columns])
         given = self.layout.unit.get('position')
         headings = [self.headings[column] for column in columns]
-        units = {given} if given else {heading.unit_m for heading in headings}
-        unknown = {repr(h.unit) for h in headings if h.unit and not (given or h.unit_m)}
+        units = {given} if given else {LENGTHS.get(h.unit) for h in headings}
+        unknown = {repr(h.unit) for h in headings if h.unit and not (given or h.unit in LENGTHS)}
         if unknown or len(units) > 1 or not units <= {None, *LENGTH_UNITS}:
             named = unknown or [UNIT_NAMES[unit] if unit else 'no unit' for unit in units]
             raise self.error(
@@ -289,7 +287,7 @@ class ReadingTable(Table):
         values = np.column_stack([self.numbers(k, may_be_empty=True) for k in films])
         row, which = np.nonzero(np.isfinite(values))
         given = self.layout.unit.get('thickness')
-        said = {self.film_unit_m, *(self.headings[k].unit_m for k in films)} - {None}
+        said = {self.film_unit_m, *(LENGTHS.get(self.headings[k].unit) for k in films)} - {None}
         units = [given] if given else sorted(unit for unit in said if unit)
         if len(units) > 1:
             found = ' and '.join(sorted(UNIT_NAMES[unit] for unit in units))
@@ -350,17 +348,6 @@ class ReadingTable(Table):
             )
 
 
-def _known(films: bool, layout: Layout) -> Callable[[list[Heading]], int]:
-    """What counts the quantities that headings name, 0 where a needed one is missing."""
-    needed = (('thickness',),) if films else (AXES, ON_FACE)
-
-    def known(headings: list[Heading]) -> int:
-        at = columns_of(headings, layout)
-        return len(at) if any({*names} <= {*at} for names in needed) else 0
-
-    return known
-
-
 def _rows_in(
     path: Path, films: bool, layout: Layout, wide: int
 ) -> tuple[Sheet, int | None, ReadingTable]:
@@ -369,7 +356,13 @@ def _rows_in(
     ``wide`` is the number of columns of a table without headings, 0 for one that has them. A
     second table under other headings is refused; the same headings again are passed over.
     """
-    known = _known(films, layout)
+    needed = (('thickness',),) if films else (AXES, ON_FACE)
+
+    def known(headings: list[Heading]) -> int:
+        """How many quantities headings name, 0 where a needed one is missing."""
+        at = columns_of(headings, layout)
+        return len(at) if any({*names} <= {*at} for names in needed) else 0
+
     several: dict[str, Any] = {} if films else {'several': 'save the one of the points by itself'}
     sheet, header = find_table(path, ReadingsError, known, layout.sheet, wide, **several)
     headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []

@@ -1,19 +1,17 @@
 """Sheets of cells, from text files of any usual encoding and separator and from workbooks."""
 
 import csv
-import json
 import re
 import zipfile
 import zlib
-from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from io import BytesIO, StringIO
 from pathlib import Path
 
 from paint_deposition.errors import PaintError, some
 from paint_deposition.files.atomic import read_file, require_small_package
-from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES, NOTHING
+from paint_deposition.files.tables.gauge_formats import FOLDERS, NOTHING
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
@@ -22,10 +20,9 @@ WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
 MOST_TABLE_MB = 500
 # The place of a cell, of a row, or of the end of the table.
 XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]*)(\d+)["\']')
-ODS_TABLE = '{urn:oasis:names:tc:opendocument:xmlns:table:1.0}'
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
-EXPECTED = 'give a table as CSV, TSV, TXT or JSON, or a workbook (.xlsx, .xls, .ods)'
+EXPECTED = 'give a table as CSV, TSV or TXT, or a workbook (.xlsx, .xls)'
 
 
 @dataclass(frozen=True)
@@ -50,64 +47,38 @@ class Sheet:
 def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
     """The sheets of a workbook, or a text once for each separator in it, by blanks and by lines.
 
-    A file that is neither raises ``refusal``.
+    Of a folder, the files that ``FOLDERS`` has, else its only one. A file that is neither raises
+    ``refusal``.
     """
+    files = [path]
+    if path.is_dir():
+        names = {file.name for file in path.iterdir() if file.is_file()}
+        visible = sorted(name for name in names if not name.startswith('.'))
+        batch = next((files for files in FOLDERS.values() if {*files} <= names), None)
+        if batch is None and len(visible) != 1:
+            named = some(visible, 6) or 'no file'
+            raise refusal(f'{path} holds {named}; name the one with the table')
+        files = [path / name for name in batch or visible]
     try:
-        content = _content(path, refusal)
+        content = b'\n'.join(read_file(file, refusal, MOST_TABLE_MB) for file in files)
     except FileNotFoundError:
         raise refusal(f'{path}: no such file; {EXPECTED}') from None
     except OSError as error:
         raise refusal(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
-    except (zipfile.BadZipFile, zlib.error, RuntimeError, ValueError) as error:  # also encrypted
-        raise refusal(f'{path}: cannot be read as a zip ({error}); {EXPECTED}') from None
     try:
         if content.startswith(WORKBOOKS):
             return _sheets_of_workbook(content)
         texts = _decoded(content)
-        if records := _records(texts[0][0]):
-            return [records]
         return [sheet for text, encoding in texts for sheet in _sheets_of_text(text, encoding)]
     except ValueError as error:
         reason = ' '.join(str(error).split())
         raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
 
 
-def _content(path: Path, refusal: type[PaintError]) -> bytes:
-    """What a file holds, or the files of a folder or a zip that are its one table."""
-    if path.is_dir():
-        files = {file.name: file for file in path.iterdir() if file.is_file()}
-        wanted = _table_in(files, path, refusal)
-        return b'\n'.join(read_file(files[name], refusal, MOST_TABLE_MB) for name in wanted)
-    content = read_file(path, refusal, MOST_TABLE_MB)
-    if not (content.startswith(WORKBOOKS[0]) and zipfile.is_zipfile(BytesIO(content))):
-        return content
-    with zipfile.ZipFile(BytesIO(content)) as package:
-        members = [name for name in package.namelist() if name[-1:] != '/']
-        alike = Counter(Path(name).name for name in members)
-        names = {n if alike[Path(n).name] > 1 else Path(n).name: n for n in members}
-        if {'[Content_Types].xml', 'content.xml'} & {*names}:
-            return content  # a workbook
-        require_small_package(package)
-        return b'\n'.join(package.read(names[name]) for name in _table_in(names, path, refusal))
-
-
-def _table_in(names: Collection[str], path: Path, refusal: type[PaintError]) -> Sequence[str]:
-    """The names of those that ``FOLDERS`` has, one below the other, else of the only file."""
-    for wanted in FOLDERS.values():
-        if {*wanted} <= {*names}:
-            return wanted
-    visible = sorted(name for name in names if not Path(name).name.startswith('.'))
-    if len(visible) != 1:
-        raise refusal(f'{path} holds {some(visible, 6) or "no file"}; name the one with the table')
-    return visible
-
-
-def is_gauge_file(path: Path) -> bool:
-    """Whether a path can be that of readings only: JSON, a zip, or a gauge's folder."""
-    if path.is_dir():
-        names = {file.name for file in path.iterdir()}
-        return any({*files} <= names for files in FOLDERS.values())
-    return path.suffix.lower() in ('.json', '.zip')
+def is_gauge_folder(path: Path) -> bool:
+    """Whether a path is a folder as ``FOLDERS`` has it."""
+    names = {file.name for file in path.iterdir()} if path.is_dir() else set()
+    return any({*files} <= names for files in FOLDERS.values())
 
 
 def text_of(cell: Cell) -> str:
@@ -135,24 +106,6 @@ def _decoded(content: bytes) -> list[tuple[str, str]]:
     return found
 
 
-def _records(text: str) -> Sheet | None:
-    """The first list of records in JSON as a table, what stands beside it above; else None."""
-    try:
-        found = json.loads(text, parse_int=float) if text.lstrip()[:1] in ('[', '{') else None
-    except (ValueError, RecursionError):
-        return None
-    above: list[list[Cell]] = []
-    while isinstance(found, dict):
-        above += [[_cell(key), _cell(value)] for key, value in found.items()]
-        found = next((value for value in found.values() if isinstance(value, list | dict)), None)
-    records = [one for one in found or () if isinstance(one, dict)]
-    if not records:
-        return None
-    keys = list(dict.fromkeys(key for record in records for key in record))
-    rows = [[_cell(record.get(key)) for key in keys] for record in records]
-    return Sheet.of(enumerate([*above, [*map(_cell, keys)], *rows], 1), 'JSON')
-
-
 def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
     sheets = []
     separators = {'\t': 'tabs', ';': 'semicolons', '|': 'bars', ',': 'commas'}
@@ -168,23 +121,26 @@ def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
     lines = text.splitlines()
     by_blanks = enumerate((list[Cell](line.split()) for line in lines), 1)
     by_lines = enumerate((list[Cell]([_cell(line)]) for line in lines), 1)
-    whole = Sheet.of(by_lines, f'one column, {encoding}')
-    for name, pattern in LINES.items():
-        rows = [
-            (number, [_cell(part or '') for part in found.groups()])
-            for number, line in enumerate(lines, 1)
-            if (found := pattern.fullmatch(line))
-        ]
-        if 2 * len(rows) > len(whole.rows):
-            sheets.append(Sheet.of([(0, [*pattern.groupindex]), *rows], f'{name}, {encoding}'))
-    return [*sheets, Sheet.of(by_blanks, f'blanks, {encoding}'), whole]
+    by_line = Sheet.of(by_lines, f'one column, {encoding}')
+    return [*sheets, Sheet.of(by_blanks, f'blanks, {encoding}'), by_line]
 
 
 def _sheets_of_workbook(content: bytes) -> list[Sheet]:
+    """The sheets, unless a stray cell far away, or cells said to repeat, would fill the memory."""
     from python_calamine import CalamineError, CalamineWorkbook
 
+    cells = 0
     try:
-        _refuse_far_cells(content)
+        if zipfile.is_zipfile(BytesIO(content)):
+            with zipfile.ZipFile(BytesIO(content)) as package:
+                require_small_package(package)
+                for name in package.namelist():
+                    if name == 'content.xml':
+                        raise ValueError('a workbook (an .ods; save it as .xlsx)')
+                    if name.startswith('xl/') and name.endswith('.xml'):
+                        cells = max(cells, _most_cells(package.read(name)))
+        if cells > 10_000_000:  # the reader keeps all up to the last one, some 30 bytes each
+            raise ValueError('a workbook (delete what lies far outside the table)')
         workbook = CalamineWorkbook.from_filelike(BytesIO(content))
         sheets = []
         for sheet in map(workbook.get_sheet_by_name, workbook.sheet_names):
@@ -195,56 +151,18 @@ def _sheets_of_workbook(content: bytes) -> list[Sheet]:
         raise ValueError(f'a workbook ({error})') from None
 
 
-def _refuse_far_cells(content: bytes) -> None:
-    """Refuse a workbook whose sheets would fill the memory: by a stray cell far away in an .xlsx,
-    by cells that are said to repeat in an .ods.
-    """
-    if not zipfile.is_zipfile(BytesIO(content)):
-        return
-    with zipfile.ZipFile(BytesIO(content)) as package:
-        require_small_package(package)
-        cells = 0
-        for name in package.namelist():
-            if name.startswith('xl/') and name.endswith('.xml'):
-                places = set(XLSX_CELL.findall(package.read(name)))
-                # As many letters and digits as make any sheet too large.
-                names = (column[:7][::-1] for column, _ in places)
-                widths = (sum(26**k * (c & 31) for k, c in enumerate(name)) for name in names)
-                rows = (int(row) if len(row) < 10 else 10**9 for _, row in places)
-                cells = max(cells, max(widths, default=0) * max(rows, default=0))
-            if name == 'content.xml':
-                cells = max(cells, _cells_of_open_document(package.read(name)))
-    if cells > 10_000_000:  # the reader keeps all up to the last one, some 30 bytes each
-        raise ValueError('a workbook (delete what lies far outside the table)')
-
-
-def _cells_of_open_document(content: bytes) -> int:
-    """The cells up to the last that holds something, those that are said to repeat in full."""
-    from lxml import etree
-
-    cells = width = height = 0
-    try:
-        rows = etree.iterparse(
-            BytesIO(content), tag=f'{ODS_TABLE}table-row', resolve_entities=False
-        )
-        for _, row in rows:
-            at = last = 0
-            for cell in row:
-                at += int(cell.get(f'{ODS_TABLE}number-columns-repeated', 1))
-                last = at if len(cell) or len(cell.attrib) > 1 else last
-            height += int(row.get(f'{ODS_TABLE}number-rows-repeated', 1))
-            width = max(width, last)
-            cells = max(cells, width * height * bool(last))
-            row.clear()
-    except etree.XMLSyntaxError as error:
-        raise ValueError(f'a workbook ({error})') from None
-    return cells
+def _most_cells(xml: bytes) -> int:
+    """The cells up to the last place that is named in a sheet of an .xlsx."""
+    places = set(XLSX_CELL.findall(xml))
+    # As many letters and digits as make any sheet too large.
+    names = (column[:7][::-1] for column, _ in places)
+    widths = (sum(26**k * (c & 31) for k, c in enumerate(name)) for name in names)
+    rows = (int(row) if len(row) < 10 else 10**9 for _, row in places)
+    return max(widths, default=0) * max(rows, default=0)
 
 
 def _cell(value: object) -> Cell:
-    """A value as a cell; nothing of what JSON has nested."""
-    if value is None or isinstance(value, list | dict):
-        return ''
+    """A value as a cell."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     text = ' '.join(str(value).strip().splitlines())

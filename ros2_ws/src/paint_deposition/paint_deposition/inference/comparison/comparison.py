@@ -5,7 +5,7 @@ Zones stand beside their targets as on an acceptance sheet.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -164,18 +164,6 @@ class Comparison(Tabular):
             columns[name][used] = getattr(self.readings, name)
         layers = np.concatenate([readings.layer for readings in taken])
         return columns | {'used': used, 'layer': layers}
-
-    def short_table(self) -> list[Sequence[Any]]:
-        """The misfit of each experiment."""
-        rows = ((m.label, m.residuals) for m in self.misfits if m.kind == 'experiment')
-        return [
-            ('', 'readings', 'bias [µm]', 'RMSE [µm]', 'χ² per reading'),
-            *(
-                (label, len(of), f'{of.bias_um:+.2f}', f'{of.rmse_um:.2f}',
-                 f'{of.chi_square_per_reading:.2f}')
-                for label, of in rows
-            ),
-        ]  # fmt: skip
 
     @cached_property
     def geometry(self) -> dict[str, SprayGeometry]:

@@ -177,13 +177,6 @@ class Diagnosis(Tabular):
             ],
         }
 
-    def short_table(self) -> list[Sequence[Any]]:
-        """A row for each class."""
-        columns = self.columns()
-        columns['accepted'] = ['added' if one else '' for one in columns['accepted']]
-        columns['probability'] = list(map(percent, columns['probability']))
-        return [tuple(columns), *zip(*columns.values(), strict=True)]
-
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user, warnings first."""

@@ -26,7 +26,7 @@ from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage, open_bag
 from paint_deposition.files.recordings.bags import (
     BOOL_TYPE,
-    choose_state_topic,
+    STATE_TYPES,
     motion_of,
     trajectory_of,
 )
@@ -147,9 +147,9 @@ class BagPlayer(PaintNode):
                 self._motion = motion_of(bag, *motion)
             self._state_topic: BagTopic | None = None
             self._states_are_current = False
-            unused = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
+            unused = [topic.name for topic in bag.topics_of(*STATE_TYPES)]
             if values['state_topic']:
-                self._state_topic = choose_state_topic(bag, values['state_topic'])
+                self._state_topic = bag.choose(values['state_topic'], STATE_TYPES, 'state')
                 if self._state_topic.type == BOOL_TYPE:
                     # Raises an error unless recorder and robot had the same clock.
                     trajectory_of(bag, motion[0], values['state_topic'], *motion[1:])
