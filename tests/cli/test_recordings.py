@@ -1,5 +1,7 @@
 """`paint inspect` and `paint recover`, as a user runs them."""
 
+import json
+
 import pytest
 import trimesh
 
@@ -75,8 +77,10 @@ def test_a_table_of_readings_says_its_zeros_repeats_and_gaps(tmp_path):
     (tmp_path / 'B1').mkdir()
     (tmp_path / 'B1/header.txt').write_text('Name,B1\n')
     (tmp_path / 'B1/readings.txt').write_text('Reading,Value\n1,20\n2,21\n3,22\n4,21\n')
-    done = ran('inspect', 'B1', '--points', 'points.csv', cwd=tmp_path)
-    assert '4 readings at 4 points' in done.stdout
+    (tmp_path / 'b.json').write_text(json.dumps([{'thickness': um} for um in (20, 21, 22, 21)]))
+    for name in ('B1', 'b.json'):
+        done = ran('inspect', name, '--points', 'points.csv', cwd=tmp_path)
+        assert '4 readings at 4 points' in done.stdout
 
 
 def test_a_point_read_in_two_layers_is_not_measured_again(tmp_path):

@@ -28,6 +28,10 @@ from paint_deposition.files.tables.reading_columns import Layout
 from robot_arm import URDF
 from workbook import write_workbook
 
+GAUGE_JSON = (
+    b'{"unit": "um", "results": [{"x_m": 0, "y_m": 0, "z_m": 0, "thickness_um": 20, "id": "a"}, '
+    b'{"x_m": 0, "y_m": 0, "z_m": 1, "thickness_um": 21.5, "id": null}]}'
+)
 RAPID = rb"""MODULE Door
   PERS wobjdata wobjDoor:=[FALSE,TRUE,"",[[900,0,600],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
   CONST robtarget p1:=[[0,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
@@ -208,6 +212,9 @@ def targets() -> dict[str, Target]:
             '{1} .trans /0 not 9E9 - FOR WHILE TRUE DO ENDFOR IF TEST RETURN Incr UseBrushTab ,',
         ),
         'readings': Target('.csv', pd.read_readings, readings, cells),
+        'gauge_json': Target(
+            '.json', pd.read_readings, [GAUGE_JSON], '[ ] { } , : " null NaN 1e999 -1 "x": [[ []',
+        ),
         'measuring_points': Target(
             '.csv', lambda path: MeasuringPoints.read(path, Layout(), None), [points], cells
         ),

@@ -25,7 +25,8 @@ MERGED = [
 
 # The file, and the films [µm] and the points of its rows where they are not those four in order.
 CASES: dict[str, tuple[str, ...]] = {
-    'coatmaster Flex': ('coatmaster.csv', '21.5 22.5 19.5', 'P1 P2 P4'),
+    'coatmaster Flex, CSV or JSON': ('coatmaster.csv', '21.5 22.5 19.5', 'P1 P2 P4'),
+    'coatmaster Flex, JSON': ('coatmaster.json', '21.5 22.5 19.5', 'P1 P2 P4'),
     'BYK auto-chart': ('byk.csv',),
     'DeFelsko PosiTector, Value': ('positector_value.csv',),
     'DeFelsko PosiTector, Thickness': ('positector_thickness.csv',),

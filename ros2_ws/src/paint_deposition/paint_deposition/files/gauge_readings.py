@@ -33,7 +33,7 @@ def read_readings(
     """Read gauge readings.
 
     Args:
-        path: CSV, TSV, TXT, a workbook, or a folder. The project's own columns are
+        path: CSV, TSV, TXT, JSON, a workbook, or a folder. The project's own columns are
             ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``, ``group``,
             ``session``, ``layer`` and ``nx,ny,nz``; others are known by usual headings, and the
             layouts of gauges by ``gauge_formats``. Without labels, readings at exactly one place

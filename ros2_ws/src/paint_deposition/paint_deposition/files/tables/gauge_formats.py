@@ -64,7 +64,7 @@ class GaugeFormat:
 GOOD = ('', 'ok')
 FORMATS = (
     GaugeFormat(
-        'coatmaster Flex', ('fitstate', 'snrstate', 'evaluatestate'),
+        'coatmaster Flex, CSV or JSON', ('fitstate', 'snrstate', 'evaluatestate'),
         {'thickness': 'thickness', 'point': 'sampleid'}, ('id', 'configid', 'fit', 'snr'),
         {'fitstate': GOOD, 'snrstate': GOOD, 'evaluatestate': GOOD,
          'error': (*GOOD, '0', 'none', 'null', 'no error')},

@@ -1,6 +1,7 @@
 """Sheets of cells, from text files of any usual encoding and separator and from workbooks."""
 
 import csv
+import json
 import re
 import zipfile
 import zlib
@@ -22,7 +23,7 @@ MOST_TABLE_MB = 500
 XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]*)(\d+)["\']')
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
-EXPECTED = 'give a table as CSV, TSV or TXT, or a workbook (.xlsx, .xls)'
+EXPECTED = 'give a table as CSV, TSV, TXT or JSON, or a workbook (.xlsx, .xls)'
 
 
 @dataclass(frozen=True)
@@ -69,16 +70,20 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
         if content.startswith(WORKBOOKS):
             return _sheets_of_workbook(content)
         texts = _decoded(content)
+        if records := _records(texts[0][0]):
+            return [records]
         return [sheet for text, encoding in texts for sheet in _sheets_of_text(text, encoding)]
     except ValueError as error:
         reason = ' '.join(str(error).split())
         raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
 
 
-def is_gauge_folder(path: Path) -> bool:
-    """Whether a path is a folder as ``FOLDERS`` has it."""
-    names = {file.name for file in path.iterdir()} if path.is_dir() else set()
-    return any({*files} <= names for files in FOLDERS.values())
+def is_gauge_file(path: Path) -> bool:
+    """Whether a path can be that of readings only: JSON, or a gauge's folder."""
+    if path.is_dir():
+        names = {file.name for file in path.iterdir()}
+        return any({*files} <= names for files in FOLDERS.values())
+    return path.suffix.lower() == '.json'
 
 
 def text_of(cell: Cell) -> str:
@@ -104,6 +109,24 @@ def _decoded(content: bytes) -> list[tuple[str, str]]:
     if not found:
         raise ValueError('text')
     return found
+
+
+def _records(text: str) -> Sheet | None:
+    """The first list of records in JSON as a table, what stands beside it above; else None."""
+    try:
+        found = json.loads(text, parse_int=float) if text.lstrip()[:1] in ('[', '{') else None
+    except (ValueError, RecursionError):
+        return None
+    above: list[list[Cell]] = []
+    while isinstance(found, dict):
+        above += [[_cell(key), _cell(value)] for key, value in found.items()]
+        found = next((value for value in found.values() if isinstance(value, list | dict)), None)
+    records = [one for one in found or () if isinstance(one, dict)]
+    if not records:
+        return None
+    keys = list(dict.fromkeys(key for record in records for key in record))
+    rows = [[_cell(record.get(key)) for key in keys] for record in records]
+    return Sheet.of(enumerate([*above, [*map(_cell, keys)], *rows], 1), 'JSON')
 
 
 def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
@@ -162,7 +185,9 @@ def _most_cells(xml: bytes) -> int:
 
 
 def _cell(value: object) -> Cell:
-    """A value as a cell."""
+    """A value as a cell; nothing of what JSON has nested."""
+    if value is None or isinstance(value, list | dict):
+        return ''
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     text = ' '.join(str(value).strip().splitlines())
