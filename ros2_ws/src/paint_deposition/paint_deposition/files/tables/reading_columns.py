@@ -21,7 +21,6 @@ from paint_deposition.files.tables.gauge_formats import (
 )
 from paint_deposition.files.tables.headings import (
     BESIDE,
-    LENGTHS,
     NOMINAL,
     Heading,
     headings_in,
@@ -137,7 +136,7 @@ def plain(heading: Heading) -> str:
 
 def _is_of_film(heading: Heading) -> bool:
     """Whether a heading has the unit of a film, or none."""
-    return not heading.unit or LENGTHS.get(heading.unit) in FILM_UNITS
+    return not heading.unit or heading.unit_m in FILM_UNITS
 
 
 def _layer(heading: Heading) -> str:
