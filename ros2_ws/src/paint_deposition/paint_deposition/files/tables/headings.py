@@ -87,11 +87,6 @@ class Heading:
             return Heading(text, tuple(w for w in words[:-1] if w != 'in'), SHORT[words[-1]])
         return Heading(text, words)
 
-    @property
-    def unit_m(self) -> float | None:
-        """Metres in its unit, None where it has no unit of length."""
-        return LENGTHS.get(self.unit)
-
 
 def words_of(text: str) -> tuple[str, ...]:
     """The words of a text, small and without accents; '#' counts as one."""

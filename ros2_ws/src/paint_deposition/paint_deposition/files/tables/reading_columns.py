@@ -21,6 +21,7 @@ from paint_deposition.files.tables.gauge_formats import (
 )
 from paint_deposition.files.tables.headings import (
     BESIDE,
+    LENGTHS,
     NOMINAL,
     Heading,
     headings_in,
@@ -136,7 +137,7 @@ def plain(heading: Heading) -> str:
 
 def _is_of_film(heading: Heading) -> bool:
     """Whether a heading has the unit of a film, or none."""
-    return not heading.unit or heading.unit_m in FILM_UNITS
+    return not heading.unit or LENGTHS.get(heading.unit) in FILM_UNITS
 
 
 def _layer(heading: Heading) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.tables.gauge_formats import ALIASES, STATISTIC
 from paint_deposition.files.tables.headings import (
+    LENGTHS,
     UNIT_NAMES,
     Heading,
     find_table,
@@ -80,7 +81,10 @@ class ReadingTable(Table):
         thick = table.at['thickness'] if films else []
         table.layers = layers_of(table.headings, layout, thick)
         refuse_misleading(table, table.at, layout, table.layers, bare)
-        # The cells: their unit in the heading, and n/a for what is no reading.
+        # The cells: one reading in each, its unit in the heading, and n/a for what is none.
+        if films and not table.layers:
+            table, thick = table.with_repeats_apart(thick)
+            table.at['thickness'] = thick
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in table.at.get(q, [])]
         numeric += thick
         table = table.without_units_in_cells(numeric).with_decimal(numeric, layout.decimal)
@@ -258,8 +262,8 @@ class ReadingTable(Table):
         values = np.column_stack([self.numbers(column) for column in columns])
         given = self.layout.unit.get('position')
         headings = [self.headings[column] for column in columns]
-        units = {given} if given else {heading.unit_m for heading in headings}
-        unknown = {repr(h.unit) for h in headings if h.unit and not (given or h.unit_m)}
+        units = {given} if given else {LENGTHS.get(h.unit) for h in headings}
+        unknown = {repr(h.unit) for h in headings if h.unit and not (given or h.unit in LENGTHS)}
         if unknown or len(units) > 1 or not units <= {None, *LENGTH_UNITS}:
             named = unknown or [UNIT_NAMES[unit] if unit else 'no unit' for unit in units]
             raise self.error(
@@ -286,7 +290,7 @@ class ReadingTable(Table):
         values = np.column_stack([self.numbers(k, may_be_empty=True) for k in films])
         row, which = np.nonzero(np.isfinite(values))
         given = self.layout.unit.get('thickness')
-        said = {self.film_unit_m, *(self.headings[k].unit_m for k in films)} - {None}
+        said = {self.film_unit_m, *(LENGTHS.get(self.headings[k].unit) for k in films)} - {None}
         units = [given] if given else sorted(unit for unit in said if unit)
         if len(units) > 1:
             found = ' and '.join(sorted(UNIT_NAMES[unit] for unit in units))
