@@ -50,15 +50,19 @@ def proposals(diagnosis):
     return places, sprays
 
 
+def of(told, beside, proposals=((), ()), older=()) -> ReportData:
+    told = replace(told)
+    vars(told).update(comparisons=beside, proposals=proposals)
+    return ReportData(told, older)
+
+
 @pytest.fixture(scope='module')
-def tell(comparisons):
+def tell(diagnosis, comparisons):
     """`tell(diagnosis)`: the report of one whose comparisons and films are known already."""
-    painted = ReportData(comparisons).painted
+    painted = of(diagnosis, comparisons).painted
 
     def tell(told, beside=comparisons, proposals=((), ()), older=()) -> str:
-        told = replace(told)
-        vars(told).update(comparisons=beside, proposals=proposals)
-        data = ReportData.of(told, older)
+        data = of(told, beside, proposals, older)
         vars(data).update(painted=[films[: len(beside)] for films in painted])
         return report_html(data)
 
@@ -155,13 +159,13 @@ def test_the_cost_is_what_the_pattern_cannot_imitate(report, diagnosis, comparis
     assert rms < np.sqrt(np.mean((with_it - alone) ** 2))
 
 
-def test_part_batch_and_target_of_the_campaign_lead_the_page(particular):
+def test_part_batch_and_target_of_the_campaign_lead_the_page(particular, diagnosis):
     page, beside = particular
     study = beside[0].study
     measured, target = study.measured_um, study.campaign.target_um
     assert page.clashes == page.open == []
     assert 'Part door <left> Batch 4711 An effect is missing' in page.text
-    rows = point_rows(ReportData(beside))
+    rows = point_rows(of(diagnosis, beside))
     for name, holds in (('low', measured < target - 2.0), ('high', measured > target + 2.0)):
         assert [row['film'] == name for row in rows] == holds.tolist()
     panel = measured[: len(study.campaign.experiments[0])]
@@ -271,10 +275,10 @@ def colourful_share(picture: Path) -> float:
 def test_a_law_learned_as_asked_is_no_verdict(diagnosis):
     campaign = diagnosis.study.campaign
     done = refit(campaign, DepositionModel(), learned_law('height_fraction'))
-    page = Page(report_html(ReportData.of(done)))
+    page = Page(report_html(ReportData(done)))
     assert 'Added as asked' in page.text
     assert 'no known effect' not in page.text
-    (law,) = law_rows(ReportData.of(done))
+    (law,) = law_rows(ReportData(done))
     told = f"neutral outside the readings' range, {law['ends']}. At 95 % it is known best, to "
     assert f'{told}{law["best"]}, and least, to {law["least"]}.' in page.text
     assert re.fullmatch(r'± [\d.]+ µm at [\d.]+', law['best'])

@@ -1,6 +1,5 @@
 """What the report calls and how it shows effects of users and learned laws."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -91,7 +90,7 @@ def study(tmp_path_factory):
 
 
 def shown(study: Study, *effects) -> ReportData:
-    return ReportData((compare(study, DepositionModel(effects=effects)),))
+    return ReportData(compare(study, DepositionModel(effects=effects)))
 
 
 @pytest.mark.slow
@@ -156,7 +155,8 @@ def test_the_footprint_is_shown_with_its_band(study):
     profile = FootprintProfile(radius_m, eq1, eq1 + 0.1, np.array([0.5, 0.1, 0.01]))
     figures = DiscrepancyFigures(0.02, 0.0, 0.03, 0.1, (0.06, 2.0), profile)
     assert charts.profile_figure(shown(study)) is None
-    diagnosed = replace(shown(study), diagnosis=SimpleNamespace(discrepancy=figures))
+    diagnosed = shown(study)
+    diagnosed.diagnosis = SimpleNamespace(discrepancy=figures)
     band, plain, found = charts.profile_figure(diagnosed)['charts'][0]['data']
     assert (plain['y'] == eq1).all()
     assert (found['y'] == eq1 + 0.1).all()

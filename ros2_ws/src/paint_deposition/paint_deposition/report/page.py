@@ -137,7 +137,7 @@ def write_story(
         hidden: the effect that was hidden in the readings, for the sceptic.
         commands: that do the same by hand, by their names.
     """
-    data = ReportData.of(found)
+    data = ReportData(found)
     index = [experiment.name for experiment in data.experiments].index('door')
     door = PartPicture.of(film.surface)
     painted, _ = page_film(
