@@ -17,7 +17,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.nodes import BEND, FASTEST, JOINT, LEAD
 from paint_deposition.planning.planned_film import Contact, WantedFilm, evenness
-from paint_deposition.planning.programme import STANDING_M, Programme, speed_along, strokes_of
+from paint_deposition.planning.programme import STANDING_M, Programme, strokes_of
 from paint_deposition.planning.quadratic_program import SLOWEST
 from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.retiming import Retiming
@@ -201,8 +201,9 @@ class Improvement:
             closes = off == last.off_m and last_before.off_m in closed_m
             earlier = first_before.on_m - on if opens else 0.0
             later = off - last_before.off_m if closes else 0.0
-            old, new = (float(speed_along(p, np.array(inside))[0]) for p in (original, improved))
-            speed = speed_along(improved, np.linspace(*inside, 61))
+            old, new = (float(p.speed_between(*inside)) for p in (original, improved))
+            places = np.linspace(*inside, 61)
+            speed = improved.speed_between(places[:-1], places[1:])
             found.append(PassChange(
                 int(number) + 1, (on, off), (old, new), float(speed.min()), float(speed.max()),
                 earlier, later, earlier / float(speed[0]), later / float(speed[-1]),

@@ -24,9 +24,7 @@ from paint_deposition.planning.placement import (
     LineFilms,
     Placement,
     best_placement,
-    passes_to_cover,
     place_passes,
-    placement_at,
 )
 from paint_deposition.planning.planned_film import (
     PlannedFilm,
@@ -53,7 +51,6 @@ class Plan(PlannedFilm):
         style: how passes are run.
         placement: number, index and place of the passes, with sigma_n of the search.
         plane: recommendation for a plane of the part's size.
-        plane_on_part: its passes laid about the middle of this part.
         line_films: films of single passes, for other placings.
         unoptimised: of an optimised plan, the plan that it started from; else None.
     """
@@ -61,7 +58,6 @@ class Plan(PlannedFilm):
     style: PassStyle
     placement: Placement
     plane: Recommendation
-    plane_on_part: Placement
     line_films: LineFilms
     unoptimised: 'Plan | None' = None
 
@@ -75,15 +71,6 @@ class Plan(PlannedFilm):
         return (
             f'{len(self.passes)} {self.request.direction} passes at '
             f'{self.placement.index_m * 1e3:.0f} mm, {speeds}: {super().sentence}'
-        )
-
-    @property
-    def comparison(self) -> str:
-        """sigma_n of the passes for a plane: on the plane, and on this part, in a sentence."""
-        return (
-            f'on a plane: sigma_n {100 * self.plane.sigma_n:.1f} % at '
-            f'{self.plane.index_m * 1e3:.0f} mm; those passes about the middle of this part: '
-            f'{100 * self.plane_on_part.sigma_n:.1f} %'
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -106,12 +93,6 @@ class Plan(PlannedFilm):
                 'cycle_time_s': self.unoptimised.cycle_time_s,
                 'passes': self.unoptimised.placement.passes,
                 'capture_fraction': self.unoptimised.statistics.capture_fraction,
-            },
-            'plane': {
-                'index_m': self.plane.index_m,
-                'passes': self.plane_on_part.passes,
-                'sigma_n': self.plane.sigma_n,
-                'sigma_n_on_part': self.plane_on_part.sigma_n,
             },
         }
 
@@ -151,8 +132,6 @@ def plan(
         0.5 * plane.sb50_m, lambda share: progress('single passes', share),
     )  # fmt: skip
     placement = place_passes(films, ends, request.index_range_m(plane.index_m), tolerance)
-    count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
-    on_part = placement_at(films, count, plane.index_m, 0.5 * (ends[0] + ends[1]))
     target = None if request.speed_m_per_s else wanted.target_um
     rounds = 4
     for round_ in range(rounds):
@@ -174,7 +153,7 @@ def plan(
         )
     return Plan(
         **found, passes=passes, moves=tuple(planned_moves(passes)), style=style,
-        placement=placement, plane=plane, plane_on_part=on_part, line_films=films,
+        placement=placement, plane=plane, line_films=films,
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.part_places import PartPlaces
-from paint_deposition.planning.programme import STANDING_M, speed_along
+from paint_deposition.planning.programme import STANDING_M
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.colour_scales import (
     ACCENT,
@@ -266,7 +266,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
         places = np.linspace(begin + STANDING_M, end - STANDING_M, 121)
         middle = 0.5 * (places[1:] + places[:-1]) - begin
         for name, programme, colour in programmes:
-            speed = speed_along(programme, places)
+            speed = programme.speed_between(places[:-1], places[1:])
             chart.plot(middle, speed, color=colour, linewidth=1.6, label=name)
         quiet(chart, 'along the pass [m]', '', f'pass {change.number}', size=9.0)
     for chart in charts[:, 0]:
