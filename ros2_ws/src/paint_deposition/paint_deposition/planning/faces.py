@@ -26,11 +26,11 @@ from paint_deposition.part.zones import PointZones
 from paint_deposition.planning.passes import PlannedPass, plan_passes, planned_moves, trajectory_of
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.planned_film import (
+    LaidFilm,
     PlannedFilm,
     WantedFilm,
     contacts,
     evenness,
-    predicted,
     simulated,
 )
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
@@ -132,8 +132,8 @@ def plan_faces(
             surface, model, request, wanted, passes, trajectory, request.target_um, wanted_cm3,
             trajectory.duration_s, progress,
         )  # fmt: skip
-    found = predicted(surface, model, request, wanted, trajectory)
-    sigma_n = found['sigma_n']
+    film = LaidFilm.of(surface, wanted, trajectory, *simulated(surface, model, trajectory))
+    sigma_n = film.sigma_n
     if request.tolerance is not None and sigma_n > request.tolerance:
         raise PlanError(
             f'no passes on {len(faces)} face(s) keep sigma_n within '
@@ -141,8 +141,8 @@ def plan_faces(
             'allow that much, or narrower faces (--face-angle-deg)'
         )
     return PartPlan(
-        **found, passes=passes, moves=moves, faces=faces, margin_m=margin_m,
-        sigma_n_unblended=unblended,
+        **vars(film), surface=surface, model=model, request=request, wanted=wanted,
+        passes=passes, moves=moves, faces=faces, margin_m=margin_m, sigma_n_unblended=unblended,
     )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """The result of `improve`: a programme with other speeds, and its film before and after."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -8,82 +8,16 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.nodes import BEND, FASTEST, JOINT, LEAD
-from paint_deposition.planning.planned_film import Contact, WantedFilm, evenness
+from paint_deposition.planning.planned_film import DEFAULT_TOLERANCE, Contact, LaidFilm, WantedFilm
 from paint_deposition.planning.programme import STANDING_M, Programme, strokes_of
 from paint_deposition.planning.quadratic_program import SLOWEST
 from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.retiming import Retiming
-
-DEFAULT_TOLERANCE = 0.1
-
-
-@dataclass(frozen=True)
-class FilmSummary:
-    """A film, its evenness where one is wanted, and the paint and time spent on it."""
-
-    film_um: np.ndarray  # (V,) at the vertices of the surface
-    statistics: FilmStatistics  # of the film where one is wanted, with those of its zones
-    whole_part: FilmStatistics  # of the film on the whole part
-    # Where a film is wanted, by area, bare metal included: its mean, standard deviation over mean
-    # of the film over its own target, and share of the area within the tolerance of the target.
-    mean_um: float
-    sigma_n: float
-    within: float
-    # Time with the gun open, and from the first pose to the last.
-    spraying_s: float
-    cycle_s: float
-
-    @staticmethod
-    def of(
-        film_um: np.ndarray,
-        surface: Surface,
-        wanted: WantedFilm,
-        target_um: float,
-        tolerance: float,
-        emitted_cm3: float,
-        trajectory: Trajectory,
-    ) -> 'FilmSummary':
-        """Summarise a film; outside of zones the mean target and its tolerance hold."""
-        region = wanted.region
-        film, area = film_um[region], surface.vertex_areas_m2[region]
-        path, _ = spray_path(trajectory)
-        good = wanted.accepted(film_um, target_um, tolerance)[region]
-        zones = wanted.zones
-        elsewhere_um = (wanted.elsewhere_um or 0.0) if zones else target_um
-        return FilmSummary(
-            film_um,
-            film_statistics(film, area, emitted_cm3, zones=zones and zones.select(region)),
-            film_statistics(
-                film_um, surface.vertex_areas_m2, emitted_cm3, target_um=elsewhere_um,
-                target_tolerance_um=tolerance * elsewhere_um, zones=zones,
-            ),
-            evenness(film, area)[0],
-            evenness(film / wanted.share[region], area)[1],
-            float(area[good].sum() / area.sum()),
-            float(path.dwell_s[path.flow > 0.0].sum()), trajectory.duration_s,
-        )  # fmt: skip
-
-    @property
-    def paint_cm3(self) -> float:
-        """Paint sprayed: solids, as an endless flat panel would get [cm3]."""
-        return self.statistics.emitted_volume_cm3
-
-    def figures(self) -> dict[str, float]:
-        """Figures by name: film where one is wanted, paint and time."""
-        names = ('mean_um', 'sigma_n', 'within', 'spraying_s', 'cycle_s', 'paint_cm3')
-        return {name: getattr(self, name) for name in names} | {
-            'min_um': self.statistics.min_um,
-            'max_um': self.statistics.max_um,
-            'on_part_cm3': self.whole_part.painted_volume_cm3,
-        }
 
 
 @dataclass(frozen=True)
@@ -153,8 +87,8 @@ class Improvement:
     trajectory: Trajectory
     moves: Sequence[Move]
     retiming: Retiming
-    before: FilmSummary
-    after: FilmSummary
+    before: LaidFilm
+    after: LaidFilm
     program_difference: float
     geometry_warnings: tuple[str, ...] = ()
     drive: Drive | None = None
@@ -211,11 +145,6 @@ class Improvement:
             ))  # fmt: skip
         return tuple(found)
 
-    @cached_property
-    def paths(self) -> tuple[SprayPath, SprayPath]:
-        """Both motions cut into sub-steps."""
-        return spray_path(self.original)[0], spray_path(self.trajectory)[0]
-
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong, a line each with its likely cause."""
@@ -261,11 +190,11 @@ class Improvement:
     def sentence(self) -> str:
         """The improvement in a sentence."""
         a, b = self.before, self.after
-        more = 100.0 * (b.paint_cm3 / a.paint_cm3 - 1.0)
+        more = 100.0 * (b.paint.emitted_cm3 / a.paint.emitted_cm3 - 1.0)
         return (
             f'sigma_n {100 * a.sigma_n:.1f} → {100 * b.sigma_n:.1f} %, within {self.band} '
             f'{100 * a.within:.0f} → {100 * b.within:.0f} % of the area, paint '
-            f'sprayed {more:+.0f} %, {a.cycle_s:.1f} → {b.cycle_s:.1f} s'
+            f'sprayed {more:+.0f} %, {a.cycle_time_s:.1f} → {b.cycle_time_s:.1f} s'
         )
 
     @property
@@ -313,9 +242,20 @@ class Improvement:
 
     def to_dict(self) -> dict[str, Any]:
         """Figures, under the names of ``improvement.json``."""
+        of_film: dict[str, Callable[[LaidFilm], float]] = {
+            'mean_um': lambda of: of.mean_um,
+            'sigma_n': lambda of: of.sigma_n,
+            'within': lambda of: of.within,
+            'spraying_s': lambda of: float(of.path.dwell_s[of.path.flow > 0.0].sum()),
+            'cycle_s': lambda of: of.cycle_time_s,
+            'paint_cm3': lambda of: of.paint.emitted_cm3,
+            'min_um': lambda of: of.statistics.min_um,
+            'max_um': lambda of: of.statistics.max_um,
+            'on_part_cm3': lambda of: of.whole_part.painted_volume_cm3,
+        }
         both = {
-            name: {'before': value, 'after': self.after.figures()[name]}
-            for name, value in self.before.figures().items()
+            name: {'before': figure(self.before), 'after': figure(self.after)}
+            for name, figure in of_film.items()
         }
         films = {'before': self.before, 'after': self.after}
         laid = {when: film.statistics.to_dict().get('zones', []) for when, film in films.items()}

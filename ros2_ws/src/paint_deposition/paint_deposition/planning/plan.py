@@ -27,11 +27,10 @@ from paint_deposition.planning.placement import (
     place_passes,
 )
 from paint_deposition.planning.planned_film import (
+    LaidFilm,
     PlannedFilm,
     WantedFilm,
     contacts,
-    evenness,
-    predicted,
     simulated,
 )
 from paint_deposition.planning.programme import Programme, moves_of
@@ -115,7 +114,6 @@ def plan(
     axes = pass_axes(surface, request.direction, request.outward)
     surface_map = SurfaceMap(surface, axes, request.smoothing_radius_m)
     wanted = WantedFilm.of(surface, surface_map.painted, request.target_um, zones)
-    area = surface.vertex_areas_m2[wanted.region]
     (left, right), ends = surface_map.extent_m.tolist()
     height = ends[1] - ends[0]
     # Speeds along the passes may make a film even that is not at one speed.
@@ -136,24 +134,23 @@ def plan(
     rounds = 4
     for round_ in range(rounds):
         passes = plan_passes(surface_map, placement.lines_m(request.direction), style)
-        found = predicted(
-            surface, model, request, wanted,
-            trajectory_of(passes, frame_id), lambda share: progress('film', share),
-        )  # fmt: skip
-        mean, _ = evenness(found['film_um'][wanted.region], area)
-        ratio = mean / target if target else 1.0
+        trajectory = trajectory_of(passes, frame_id)
+        film = simulated(surface, model, trajectory, lambda share: progress('film', share))
+        laid = LaidFilm.of(surface, wanted, trajectory, *film)
+        ratio = laid.mean_um / target if target else 1.0
         if abs(ratio - 1.0) <= 2e-3 or round_ == rounds - 1:
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
-    if tolerance is not None and found['sigma_n'] > tolerance:
+    if tolerance is not None and laid.sigma_n > tolerance:
         raise PlanError(
             f'{len(passes)} passes at {placement.index_m:.3f} m lay a film of sigma_n '
-            f'{100 * found["sigma_n"]:.2f} %, not within {100 * tolerance:g} %: allow that much, '
+            f'{100 * laid.sigma_n:.2f} %, not within {100 * tolerance:g} %: allow that much, '
             'or a smaller index, or choose speeds along the passes (--optimise)'
         )
     return Plan(
-        **found, passes=passes, moves=tuple(planned_moves(passes)), style=style,
-        placement=placement, plane=plane, line_films=films,
+        **vars(laid), surface=surface, model=model, request=request, wanted=wanted,
+        passes=passes, moves=tuple(planned_moves(passes)), style=style, placement=placement,
+        plane=plane, line_films=films,
     )  # fmt: skip
 
 
@@ -254,13 +251,11 @@ def _timed_plan(
         trajectory_of(passes, unoptimised.trajectory.frame_id),
         request.target_um if zones else target_um, wanted_cm3, unoptimised.cycle_time_s, progress,
     )  # fmt: skip
-    found = predicted(
-        surface, model, request, unoptimised.wanted, trajectory,
-        lambda share: progress('film', share),
-    )  # fmt: skip
+    film = simulated(surface, model, trajectory, lambda share: progress('film', share))
+    laid = LaidFilm.of(surface, unoptimised.wanted, trajectory, *film)
     return replace(
-        unoptimised, **found, style=style, passes=passes, moves=moves,
-        placement=replace(placement, sigma_n=found['sigma_n']), unoptimised=unoptimised,
+        unoptimised, **vars(laid), style=style, passes=passes, moves=moves,
+        placement=replace(placement, sigma_n=laid.sigma_n), unoptimised=unoptimised,
     )  # fmt: skip
 
 
@@ -275,14 +270,14 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     request, trajectory = planned.request, planned.trajectory
     quarter = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi])
     turned = (Rotation.from_quat(trajectory.quaternions_xyzw) * quarter).as_quat()
-    film_um, _ = simulated(
-        planned.surface, planned.model, replace(trajectory, quaternions_xyzw=turned)
-    )
+    surface, model = planned.surface, planned.model
+    film_um, _ = simulated(surface, model, replace(trajectory, quaternions_xyzw=turned))
     # It is round if a quarter turn of the tool changes the film by less than 1e-3 of its peak.
     changed_um = np.abs(film_um - planned.film_um).max()
     drive = cell.drive(trajectory, bool(changed_um < 1e-3 * planned.film_um.max()))
-    found = predicted(planned.surface, planned.model, request, planned.wanted, drive.trajectory)
-    sigma_n, most = found['sigma_n'], request.tolerance
+    film = simulated(surface, model, drive.trajectory)
+    laid = LaidFilm.of(surface, planned.wanted, drive.trajectory, *film)
+    sigma_n, most = laid.sigma_n, request.tolerance
     if most is not None and sigma_n > most:
         raise PlanError(
             f'as the robot drives it sigma_n is {100 * sigma_n:.2f} %, where a tolerance of '
@@ -293,7 +288,7 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     shortest_m = WAYPOINT_STEP_M * WAYPOINTS_PER_MOVE
     wanted = request.improvement(0.0, request.target_um, move_min_m=shortest_m)
     moves = tuple(moves_of(Programme.of(drive.trajectory), wanted))
-    return replace(planned, **found, moves=moves, drive=drive)
+    return replace(planned, **vars(laid), moves=moves, drive=drive)
 
 
 def kept_clear(planned: Planned, envelope: GunEnvelope) -> Planned:

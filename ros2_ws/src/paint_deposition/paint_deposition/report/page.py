@@ -22,7 +22,8 @@ from paint_deposition.inference.comparison.comparison import SideBySide
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
-from paint_deposition.planning.improvement import FilmSummary, Improvement
+from paint_deposition.planning.improvement import Improvement
+from paint_deposition.planning.planned_film import LaidFilm
 from paint_deposition.report import charts, words
 from paint_deposition.report.colour_scales import TWO_SIDED_95, film_scale
 from paint_deposition.report.data import (
@@ -310,15 +311,15 @@ def unseen_figures(unseen: SideBySide) -> list[Row]:
 def improvement_figures(found: Improvement) -> list[Row]:
     """A programme before and after, in the film that the model predicts."""
 
-    def both(label: str, unit: str, digits: int, figure: Callable[[FilmSummary], float]) -> Row:
+    def both(label: str, unit: str, digits: int, figure: Callable[[LaidFilm], float]) -> Row:
         before, after = (words.fixed(figure(of), digits) for of in (found.before, found.after))
         return label, before, after, unit
 
-    more = 100.0 * (found.after.paint_cm3 / found.before.paint_cm3 - 1.0)
+    more = 100.0 * (found.after.paint.emitted_cm3 / found.before.paint.emitted_cm3 - 1.0)
     return [
         both('Standard deviation', '% of the mean', 1, lambda f: 100 * f.sigma_n),
         both('Area', f'% within {found.band}', 0, lambda f: 100 * f.within),
         both('Least film', 'µm', 1, lambda f: f.statistics.min_um),
         ('Paint sprayed', '', words.fixed(more, 0, signed=True), '%'),
-        both('Time', 's', 1, lambda f: f.cycle_s),
+        both('Time', 's', 1, lambda f: f.cycle_time_s),
     ]
