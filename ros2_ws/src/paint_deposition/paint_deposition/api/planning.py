@@ -257,8 +257,14 @@ def read_robot(
     """
     if not is_pose(part_pose):
         raise PlanError(f'part_pose is {list(part_pose)}; give {POSE_FORMAT}')
-    robot = Robot.read(Path(urdf), tip_link, base_link)
-    return RobotCell(robot.arm, Rigid.of(part_pose), joint_acceleration)
+    arm = Robot.read(Path(urdf), tip_link, base_link).arm
+    unknown = np.array(arm.joints)[np.isinf(arm.fastest)]
+    if len(unknown):
+        raise PlanError(
+            f'the URDF has no greatest speed of {" ".join(unknown)}; give each a limit, as '
+            '<limit lower="-3" upper="3" effort="0" velocity="2"/>'
+        )
+    return RobotCell(arm, Rigid.of(part_pose), joint_acceleration)
 
 
 def place(

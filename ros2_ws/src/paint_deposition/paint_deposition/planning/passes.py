@@ -49,11 +49,6 @@ class PlannedPass:
     speed_m_per_s: float  # of the TCP while spraying [m/s]
     style: PassStyle  # of all passes of its face
 
-    @property
-    def sprayed_m(self) -> float:
-        """Travel with the gun on [m]."""
-        return self.off_m - self.on_m
-
 
 def plan_pass(
     surface_map: SurfaceMap,
