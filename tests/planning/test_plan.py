@@ -96,7 +96,6 @@ def test_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it_or_run_downward
 @pytest.mark.parametrize(
     ('what', 'words'),
     [
-        ({'speed_m_per_s': None}, 'neither speed_m_per_s nor target_um'),
         ({'tolerance': 0.05, 'index_m': 0.3}, 'on this part within 5 %; the closest is'),
         (
             {'tolerance': 0.1, 'index_m': 0.2, 'optimise': True},

@@ -20,7 +20,7 @@ from paint_deposition.report.charts import (
     footprint_figures,
     learned_figures,
     map_figures,
-    profile_figures,
+    radial_figures,
 )
 from paint_deposition.report.data import ReportData
 from small_campaign import small_campaign
@@ -174,10 +174,10 @@ def test_the_footprint_is_shown_with_its_band(study):
     radius_m, eq1 = np.array([0.0, 0.1, 0.2]), np.array([0.5, 1.0, 0.1])
     profile = FootprintProfile(radius_m, eq1, eq1 + 0.1, np.array([0.5, 0.1, 0.01]))
     figures = DiscrepancyFigures(0.02, 0.0, 0.03, 0.1, (0.06, 2.0), profile)
-    assert profile_figures(shown(study)) == []
+    assert radial_figures(shown(study)) == []
     diagnosed = shown(study)
     diagnosed.diagnosis = SimpleNamespace(discrepancy=figures)
-    (axes,) = profile_figures(diagnosed)[0].axes
+    (axes,) = radial_figures(diagnosed)[0].axes
     plain, found = (line.get_ydata() for line in axes.lines)
     assert (plain == eq1).all()
     assert (found == eq1 + 0.1).all()

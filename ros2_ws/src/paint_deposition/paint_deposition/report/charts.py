@@ -53,7 +53,7 @@ def page_charts(data: ReportData) -> dict[str, list[Figure]]:
         'covariates': covariate_figures(data),
         'learned': learned_figures(data),
         'maps': map_figures(data),
-        'profile': profile_figures(data),
+        'profile': radial_figures(data),
         'footprint': footprint_figures(data),
     }
     return {name: figures for name, figures in charts.items() if figures}
@@ -172,7 +172,7 @@ def map_figures(data: ReportData) -> list[Figure]:
     return found
 
 
-def profile_figures(data: ReportData) -> list[Figure]:
+def radial_figures(data: ReportData) -> list[Figure]:
     """The footprint from its middle outward, by eq. (1) and as the readings have it."""
     left_over = data.diagnosis and data.diagnosis.discrepancy
     if not left_over:
