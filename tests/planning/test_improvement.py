@@ -77,7 +77,7 @@ def test_speed_takes_away_what_an_effect_lays_too_much(levelled):
     # 1 + h rises by 0.5 a metre.
     assert slope / level == pytest.approx(0.5, rel=0.2)
     assert levelled.after.mean_um == pytest.approx(levelled.before.mean_um, rel=3e-3)
-    original, new = levelled.original.positions_m, levelled.trajectory.positions_m
+    original, new = levelled.before.trajectory.positions_m, levelled.trajectory.positions_m
     assert cKDTree(original).query(new)[0].max() < 0.004
 
 

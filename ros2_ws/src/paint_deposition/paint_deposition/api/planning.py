@@ -229,7 +229,7 @@ def improve(
     before = LaidFilm.of(surface, sought, trajectory, film_um, paint, tolerance)
     after = LaidFilm.of(surface, sought, improved, new_um, new_paint, tolerance)
     return Improvement(
-        surface, sought, model, request, trajectory, improved, moves, retiming, before,
+        surface, sought, model, request, improved, moves, retiming, before,
         after, float(np.abs(program_um - new_um).max() / new_um.max()),
         (*seen.trajectory.warnings, *seen.geometry.warnings), drive,
     )  # fmt: skip

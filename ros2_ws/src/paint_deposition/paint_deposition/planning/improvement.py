@@ -13,7 +13,7 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.nodes import BEND, FASTEST, JOINT, LEAD
-from paint_deposition.planning.planned_film import DEFAULT_TOLERANCE, Contact, LaidFilm, WantedFilm
+from paint_deposition.planning.planned_film import Contact, LaidFilm, WantedFilm
 from paint_deposition.planning.programme import STANDING_M, Programme, strokes_of
 from paint_deposition.planning.quadratic_program import SLOWEST
 from paint_deposition.planning.requests import ImproveRequest
@@ -69,10 +69,10 @@ class Improvement:
     Attributes:
         surface: the part. wanted: the film on the side where it counts.
         model: what the gun sprays. request: objective and limits.
-        original: the motion as it was; trajectory: the improved one.
+        trajectory: the improved motion.
         moves: the improved one as moves of a robot program.
         retiming: how it was found.
-        before, after: films of both motions.
+        before, after: films of the motion as it was and of the improved one.
         program_difference: largest difference between the films of the robot program and of the
             bag, as a share of the greatest film.
         geometry_warnings: oddities of the motion over the part, each with its likely cause.
@@ -83,7 +83,6 @@ class Improvement:
     wanted: WantedFilm
     model: DepositionModel
     request: ImproveRequest
-    original: Trajectory
     trajectory: Trajectory
     moves: Sequence[Move]
     retiming: Retiming
@@ -97,24 +96,19 @@ class Improvement:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user on what was done unasked."""
-        if Programme.of(self.original).openings == self.retiming.original.openings:
+        if Programme.of(self.before.trajectory).openings == self.retiming.original.openings:
             return ()
         return (
             'the programme sprays through turns beside the part; the gun is closed there now '
             '(--spray-turns keeps it open)',
         )
 
-    @property
-    def tolerance(self) -> float:
-        """Relative difference from the target that counts as good."""
-        return self.request.tolerance or DEFAULT_TOLERANCE
-
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
         """What changes, pass by pass, numbered as a simulation of the improved programme does."""
         original, improved = self.retiming.original, self.retiming.programme
         ends_m, numbers, begins_pass = strokes_of(improved)
-        given = Programme.of(self.original).openings
+        given = Programme.of(self.before.trajectory).openings
         opened_m, closed_m = {one.on_m for one in given}, {one.off_m for one in given}
         pairs = list(zip(original.openings, improved.openings, strict=True))
         found: list[PassChange] = []
@@ -184,7 +178,7 @@ class Improvement:
         """The film accepted, in words."""
         if self.wanted.zones:
             return 'the band of its zone'
-        return f'±{100 * self.tolerance:g} % of {self.retiming.target_um:.1f} µm'
+        return f'±{100 * self.after.tolerance:g} % of {self.retiming.target_um:.1f} µm'
 
     @property
     def sentence(self) -> str:
@@ -265,7 +259,7 @@ class Improvement:
             **both,
             'whole_part': {when: film.whole_part.to_dict() for when, film in films.items()},
             'target_um': self.retiming.target_um,
-            'tolerance': self.tolerance,
+            'tolerance': self.after.tolerance,
             'sigma_n_of_path': self.sigma_n_of_path,
             'program_difference': self.program_difference,
             'sentence': self.sentence,

@@ -147,7 +147,8 @@ class LaidFilm:
     whole_part: FilmStatistics  # of the film on the whole part
     mean_um: float  # where a film is wanted
     sigma_n: float  # standard deviation over mean there, of the film over its own target
-    within: float  # share of the area there within the tolerance of the target
+    within: float  # share of the area there within the tolerance
+    tolerance: float  # difference from the target that is accepted, as a share of it
 
     @staticmethod
     def of(
@@ -173,6 +174,7 @@ class LaidFilm:
         return LaidFilm(
             trajectory, film_um, paint, statistics, whole_part, evenness(film, area)[0],
             evenness(film / wanted.share[region], area)[1], float(area[good].sum() / area.sum()),
+            tolerance,
         )  # fmt: skip
 
     @cached_property

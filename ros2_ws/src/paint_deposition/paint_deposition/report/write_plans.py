@@ -183,7 +183,7 @@ def _passes(
     name = IMPROVEMENT_FILE if isinstance(result, Improvement) else PLAN_FILE
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     files = [folder / one for one in (name, *write_passes(folder, result, part, paint_moves))]
-    given = result.original.notes if isinstance(result, Improvement) else ()
+    given = result.before.trajectory.notes if isinstance(result, Improvement) else ()
     part_facts = {'down': surface.down, 'notes': (*surface.notes, *given)}
     about = with_provenance(part_facts | dict(made_from or {}), result.model)
     write_json(files[0], {**result.to_dict(), DIGEST: model_digest(result.model), **about})
