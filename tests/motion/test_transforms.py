@@ -82,19 +82,21 @@ def apart(pose: Rigid) -> tuple[float, float]:
 @pytest.mark.parametrize('names', [(), ('P1', 'P2', 'P4')])
 def test_exact_points_give_the_pose(names):
     place = locate(touched(0.0, *names), POINTS)
-    assert max(apart(place.pose)) < 1e-12
-    assert place.rms_m < 1e-12
-    assert list(place.residuals_m) == list(names or POINTS)
-    assert place.warnings == ()
+    assert max(apart(Rigid.of(place['part_pose']))) < 1e-12
+    assert place['rms_m'] < 1e-12
+    assert list(place['residuals_m']) == list(names or POINTS)
+    assert place['warnings'] == []
 
 
 def test_noise_of_a_probe_shows_in_the_residuals_and_points_that_fix_no_pose_are_refused():
     """0.3 mm on each axis: about 0.3 mm times the root of 3, less what the fit takes."""
     place = locate(touched(0.3e-3), POINTS)
-    assert apart(place.pose)[0] < 1e-3
-    assert 0.2e-3 < place.rms_m < 0.6e-3
-    assert place.rms_m**2 == pytest.approx(np.mean(np.square([*place.residuals_m.values()])))
-    assert place.warnings == ()
+    assert apart(Rigid.of(place['part_pose']))[0] < 1e-3
+    assert 0.2e-3 < place['rms_m'] < 0.6e-3
+    assert place['rms_m'] ** 2 == pytest.approx(
+        np.mean(np.square([*place['residuals_m'].values()]))
+    )
+    assert place['warnings'] == []
     with pytest.raises(RecordingError, match='2 points in common'):
         locate({'P1': POINTS['P1'], 'P2': POINTS['P2'], 'Q': POINTS['P3']}, POINTS)
     line = {f'L{k}': np.array([0.3 * k, 0.1 * k, 0.001 * (k == 1)]) for k in range(4)}
@@ -114,8 +116,8 @@ def test_points_that_do_not_fit_are_warned_of(spoilt):
     """A point off by 30 mm, a mirrored frame, millimetres among metres."""
     points = {name: spoilt(name, at) for name, at in touched(0.1e-3).items()}
     place = locate(points, POINTS)
-    (warning,) = place.warnings
-    worst = max(place.residuals_m, key=place.residuals_m.get)
+    (warning,) = place['warnings']
+    worst = max(place['residuals_m'], key=place['residuals_m'].get)
     assert warning.startswith(f'the points do not fit, {worst} is off by')
 
 

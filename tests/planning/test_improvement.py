@@ -77,7 +77,7 @@ def test_speed_takes_away_what_an_effect_lays_too_much(levelled):
     # 1 + h rises by 0.5 a metre.
     assert slope / level == pytest.approx(0.5, rel=0.2)
     assert levelled.after.mean_um == pytest.approx(levelled.before.mean_um, rel=3e-3)
-    original, new = levelled.original.positions_m, levelled.trajectory.positions_m
+    original, new = levelled.before.trajectory.positions_m, levelled.trajectory.positions_m
     assert cKDTree(original).query(new)[0].max() < 0.004
 
 
@@ -88,7 +88,7 @@ def test_a_target_is_met_and_paint_used_is_flow_times_time(panel, even):
     better = pd.improve(panel, even.trajectory, SKEWED, **wanted)
     assert better.after.mean_um == pytest.approx(wanted_um, rel=5e-3)
     path, _ = spray_path(better.trajectory)
-    assert better.after.paint_cm3 == pytest.approx(1.0 * path.spraying_time_s, rel=1e-9)
+    assert better.after.paint.emitted_cm3 == pytest.approx(1.0 * path.spraying_time_s, rel=1e-9)
     opened = better.trajectory.trigger_flow[better.trajectory.trigger_flow > 0.0]
     assert np.all((opened >= 0.8 - 1e-6) & (opened <= 1.2 + 1e-6))
     in_program = np.unique(np.round([m.flow for m in better.moves if m.spraying], 4))
@@ -101,7 +101,7 @@ def test_a_target_is_met_and_paint_used_is_flow_times_time(panel, even):
 def test_paint_that_is_dear_is_kept_off_the_air(panel, even):
     motion = even.trajectory
     free, dear = (pd.improve(panel, motion, NARROW, paint_weight=w) for w in (0.0, 0.02))
-    assert dear.after.paint_cm3 < 0.93 * free.after.paint_cm3
+    assert dear.after.paint.emitted_cm3 < 0.93 * free.after.paint.emitted_cm3
     assert dear.after.mean_um == pytest.approx(free.after.mean_um, rel=0.01)
     assert any(change.opens_earlier_m < -0.01 for change in dear.changes)
     assert 'later' in dear.changes[0].sentence
@@ -242,7 +242,7 @@ def test_the_gun_is_closed_in_turns_beside_the_part(panel):
     sprayed = path.position_m[path.flow > 0.0]
     assert np.abs(sprayed[:, 2]).max() < 0.11
     assert np.abs(np.abs(sprayed[:, 2]) - 0.1).max() < 0.01
-    assert closed.after.paint_cm3 < 0.9 * kept.after.paint_cm3
+    assert closed.after.paint.emitted_cm3 < 0.9 * kept.after.paint.emitted_cm3
     assert closed.retiming.target_um == pytest.approx(closed.before.mean_um, rel=1e-3)
     assert [change.number for change in closed.changes] == [1, 2]
     assert np.unique(path.spray_pass[path.flow > 0.0]).tolist() == [0, 1]

@@ -17,14 +17,6 @@ from paint_deposition.planning.sides import SurfaceMap, pass_axes
 from surfaces import sheet
 
 
-def test_axes_of_a_standing_part_seen_from_its_gun():
-    surface = sheet(lambda x, z: 0.0 * x)
-    level = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]]
-    np.testing.assert_allclose(pass_axes(surface), level, atol=1e-9)
-    vertical = [[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
-    np.testing.assert_allclose(pass_axes(surface, 'vertical'), vertical, atol=1e-9)
-
-
 def test_a_plane_keeps_its_place_and_normal_to_its_edges():
     surface = sheet(lambda x, z: 0.2 * x - 0.1 * z)
     surface_map = SurfaceMap(surface, pass_axes(surface, outward=(0.0, -1.0, 0.0)), 0.1)

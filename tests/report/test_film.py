@@ -179,7 +179,7 @@ def test_a_point_is_labelled_beside_what_is_written_there():
 @pytest.mark.slow
 def test_thicker_columns_are_not_cut_off_by_a_thin_one(tmp_path):
     study = Study.of(small_campaign(tmp_path, experiments=('door',), style='columns'))
-    data = ReportData((compare(study, pd.DepositionModel()),))
+    data = ReportData(compare(study, pd.DepositionModel()))
     thin = data.profiles[0]
     thick = replace(thin, lines_um=2.0 * thin.lines_um)
     vars(data)['profiles'] = [thin, thick]
@@ -224,7 +224,7 @@ def test_a_name_with_script_tags_is_text_in_the_report(tmp_path, undrawn):
         named = Experiment.of(name, one.surface, one.path, replace(one.readings, point=points))
         head = dict.fromkeys(('part', 'batch', 'paint', 'operator'), name)
         study = Study.of(replace(campaign, experiments=(named,), head=head))
-        return report_html(ReportData((compare(study, pd.DepositionModel()),)))
+        return report_html(ReportData(compare(study, pd.DepositionModel())))
 
     plain, hostile = page('door'), page(HOSTILE)
     assert '&lt;script&gt;alert(1)' in hostile

@@ -23,11 +23,17 @@ from paint_deposition.part.zones import PointZones, Zones
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.faces import PartPlan
 from paint_deposition.planning.faces import plan_faces as planned_faces
-from paint_deposition.planning.improvement import DEFAULT_TOLERANCE, FilmSummary, Improvement
+from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.part_places import PartPlaces, part_places
 from paint_deposition.planning.plan import Plan, driven, kept_clear, optimise
 from paint_deposition.planning.plan import plan as planned
-from paint_deposition.planning.planned_film import WantedFilm, evenness, simulated
+from paint_deposition.planning.planned_film import (
+    DEFAULT_TOLERANCE,
+    LaidFilm,
+    WantedFilm,
+    evenness,
+    simulated,
+)
 from paint_deposition.planning.programme import Programme, closed_beside, moves_of
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.planning.recommendation import recommend as recommended
@@ -205,7 +211,7 @@ def improve(
     sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
     if sought.target_um is None:
         mean_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])
-        sought = replace(sought, target_um=mean_um)
+        sought = replace(sought, target_um=mean_um, elsewhere_um=mean_um)
     models = [model, *rivals]
     if posterior is not None:
         models += draw_models(model, posterior, 8, seed)
@@ -220,11 +226,10 @@ def improve(
     new_um, new_paint = simulated(surface, model, improved)
     program_um, _ = simulated(surface, model, timed(moves, gun_known=True))
     tolerance = request.tolerance or DEFAULT_TOLERANCE
-    band = surface, sought, retiming.target_um, tolerance
-    before = FilmSummary.of(film_um, *band, paint.emitted_cm3, trajectory)
-    after = FilmSummary.of(new_um, *band, new_paint.emitted_cm3, improved)
+    before = LaidFilm.of(surface, sought, trajectory, film_um, paint, tolerance)
+    after = LaidFilm.of(surface, sought, improved, new_um, new_paint, tolerance)
     return Improvement(
-        surface, sought, model, request, trajectory, improved, moves, retiming, before,
+        surface, sought, model, request, improved, moves, retiming, before,
         after, float(np.abs(program_um - new_um).max() / new_um.max()),
         (*seen.trajectory.warnings, *seen.geometry.warnings), drive,
     )  # fmt: skip
@@ -252,8 +257,14 @@ def read_robot(
     """
     if not is_pose(part_pose):
         raise PlanError(f'part_pose is {list(part_pose)}; give {POSE_FORMAT}')
-    robot = Robot.read(Path(urdf), tip_link, base_link)
-    return RobotCell(robot.arm, Rigid.of(part_pose), joint_acceleration)
+    arm = Robot.read(Path(urdf), tip_link, base_link).arm
+    unknown = np.array(arm.joints)[np.isinf(arm.fastest)]
+    if len(unknown):
+        raise PlanError(
+            f'the URDF has no greatest speed of {" ".join(unknown)}; give each a limit, as '
+            '<limit lower="-3" upper="3" effort="0" velocity="2"/>'
+        )
+    return RobotCell(arm, Rigid.of(part_pose), joint_acceleration)
 
 
 def place(

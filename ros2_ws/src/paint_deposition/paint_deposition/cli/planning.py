@@ -142,7 +142,6 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
     film, whole, gun = result.statistics, result.whole_part, result.envelope
     first = result.unoptimised if isinstance(result, pd.Plan) else None
     yield result.sentence
-    yield result.comparison
     yield (
         f'film there {film.min_um:.1f} to {film.max_um:.1f} µm; on the whole part '
         f'{whole.min_um:.1f} to {whole.max_um:.1f} µm, mean {whole.mean_um:.1f} µm, coverage '

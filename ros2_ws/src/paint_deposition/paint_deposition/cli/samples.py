@@ -58,7 +58,7 @@ def demo_command(output: Path, opens: bool) -> None:
 
     told.begin('Diagnosing its readings', 'diagnosis', 'diagnose', campaign)
     found = pd.diagnose(pd.read_campaign(campaign), progress=told.step)
-    told.end(found, page.key_figures(ReportData.of(found)))
+    told.end(found, page.key_figures(ReportData(found)))
 
     given = [word for model in models for word in ('--model', model)]
     told.begin('Comparing with readings that no fit has seen', 'unseen', 'compare', unseen, *given)

@@ -229,16 +229,16 @@ def locate_command(touched: Path, points: Path, pose_unit: str | None, as_json: 
         place = locate(*given)
     except RecordingError as error:
         raise RecordingError(f'{touched} and {points}: {error}') from None
-    print_all('warning', place.warnings)
+    print_all('warning', place['warnings'])
     if as_json:
         files = {'touched': touched, 'points': points}
-        click.echo(json_text(place.to_dict() | {'provenance': origin(files=files)}))
+        click.echo(json_text(place | {'provenance': origin(files=files)}))
         return
-    values = [f'{value + 0.0:.6g}' for value in place.pose.values]
+    values = [f'{value + 0.0:.6g}' for value in place['part_pose']]
     click.echo(f'--part-pose {" ".join(values)}')
     click.echo(f'part_pose: [{", ".join(values)}]')
-    click.echo(f'residual {place.rms_m * 1e3:.2f} mm RMS')
-    for name, residual_m in place.residuals_m.items():
+    click.echo(f'residual {place["rms_m"] * 1e3:.2f} mm RMS')
+    for name, residual_m in place['residuals_m'].items():
         click.echo(f'  {name}: {residual_m * 1e3:.2f} mm')
 
 

@@ -85,14 +85,6 @@ class RobotCell:
     part: Rigid
     acceleration: float | None = None
 
-    def __post_init__(self) -> None:
-        unknown = np.array(self.arm.joints)[np.isinf(self.arm.fastest)]
-        if len(unknown):
-            raise PlanError(
-                f'the URDF has no greatest speed of {" ".join(unknown)}; give each a limit, as '
-                '<limit lower="-3" upper="3" effort="0" velocity="2"/>'
-            )
-
     def drive(self, trajectory: Trajectory, free_roll: bool, begin: Start | None = None) -> Drive:
         """The joints that drive a motion in the frame of the part.
 

@@ -26,11 +26,11 @@ from paint_deposition.part.zones import PointZones
 from paint_deposition.planning.passes import PlannedPass, plan_passes, planned_moves, trajectory_of
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.planned_film import (
+    LaidFilm,
     PlannedFilm,
     WantedFilm,
     contacts,
     evenness,
-    predicted,
     simulated,
 )
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
@@ -59,23 +59,10 @@ class PartPlan(PlannedFilm):
     def sentence(self) -> str:
         """The plan in a sentence."""
         speeds = self.sprayed_speeds_m_per_s
+        faces = '1 face' if len(self.faces) == 1 else f'{len(self.faces)} faces'
         return (
-            f'{self._faces}, {len(self.passes)} {self.request.direction} passes at '
+            f'{faces}, {len(self.passes)} {self.request.direction} passes at '
             f'{min(speeds):.3g} to {max(speeds):.3g} m/s: {super().sentence}'
-        )
-
-    @property
-    def _faces(self) -> str:
-        return '1 face' if len(self.faces) == 1 else f'{len(self.faces)} faces'
-
-    @property
-    def comparison(self) -> str:
-        """What blending is worth, in a sentence."""
-        return (
-            f'{self._faces} without blending {100 * self.sigma_n_unblended:.1f} %, '
-            f'sprayed {1e3 * self.margin_m:.0f} mm less far at the seams and with '
-            f'{"speeds along" if self.request.optimise else "a time for"} each pass '
-            f'{100 * self.sigma_n:.1f} %'
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -145,8 +132,8 @@ def plan_faces(
             surface, model, request, wanted, passes, trajectory, request.target_um, wanted_cm3,
             trajectory.duration_s, progress,
         )  # fmt: skip
-    found = predicted(surface, model, request, wanted, trajectory)
-    sigma_n = found['sigma_n']
+    film = LaidFilm.of(surface, wanted, trajectory, *simulated(surface, model, trajectory))
+    sigma_n = film.sigma_n
     if request.tolerance is not None and sigma_n > request.tolerance:
         raise PlanError(
             f'no passes on {len(faces)} face(s) keep sigma_n within '
@@ -154,8 +141,8 @@ def plan_faces(
             'allow that much, or narrower faces (--face-angle-deg)'
         )
     return PartPlan(
-        **found, passes=passes, moves=moves, faces=faces, margin_m=margin_m,
-        sigma_n_unblended=unblended,
+        **vars(film), surface=surface, model=model, request=request, wanted=wanted,
+        passes=passes, moves=moves, faces=faces, margin_m=margin_m, sigma_n_unblended=unblended,
     )  # fmt: skip
 
 
@@ -274,11 +261,7 @@ def join_motions(
             moves += between
         parts.append(trajectory_of(face, frame_id))
         moves += own
-    return _joined(parts, frame_id), tuple(moves)
-
-
-def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:
-    """One motion after the other; where one ends and the next begins there is one pose."""
+    # One part after the other; where one ends and the next begins there is one pose.
     clock_ns = 0
     pieces: list[tuple[np.ndarray, ...]] = []
     for part in parts:
@@ -291,7 +274,8 @@ def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:
     stamps, positions, quaternions, switched, flow, brush = map(
         np.concatenate, zip(*pieces, strict=True)
     )
-    return Trajectory(
+    joined = Trajectory(
         stamps, positions, quaternions, frame_id=frame_id,
         trigger_stamps_ns=switched, trigger_flow=flow, trigger_brush=brush,
     )  # fmt: skip
+    return joined, tuple(moves)

@@ -1,6 +1,6 @@
 """The result of `improve`: a programme with other speeds, and its film before and after."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -8,82 +8,16 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.nodes import BEND, FASTEST, JOINT, LEAD
-from paint_deposition.planning.planned_film import Contact, WantedFilm, evenness
-from paint_deposition.planning.programme import STANDING_M, Programme, speed_along, strokes_of
+from paint_deposition.planning.planned_film import Contact, LaidFilm, WantedFilm
+from paint_deposition.planning.programme import STANDING_M, Programme, strokes_of
 from paint_deposition.planning.quadratic_program import SLOWEST
 from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.retiming import Retiming
-
-DEFAULT_TOLERANCE = 0.1
-
-
-@dataclass(frozen=True)
-class FilmSummary:
-    """A film, its evenness where one is wanted, and the paint and time spent on it."""
-
-    film_um: np.ndarray  # (V,) at the vertices of the surface
-    statistics: FilmStatistics  # of the film where one is wanted, with those of its zones
-    whole_part: FilmStatistics  # of the film on the whole part
-    # Where a film is wanted, by area, bare metal included: its mean, standard deviation over mean
-    # of the film over its own target, and share of the area within the tolerance of the target.
-    mean_um: float
-    sigma_n: float
-    within: float
-    # Time with the gun open, and from the first pose to the last.
-    spraying_s: float
-    cycle_s: float
-
-    @staticmethod
-    def of(
-        film_um: np.ndarray,
-        surface: Surface,
-        wanted: WantedFilm,
-        target_um: float,
-        tolerance: float,
-        emitted_cm3: float,
-        trajectory: Trajectory,
-    ) -> 'FilmSummary':
-        """Summarise a film; outside of zones the mean target and its tolerance hold."""
-        region = wanted.region
-        film, area = film_um[region], surface.vertex_areas_m2[region]
-        path, _ = spray_path(trajectory)
-        good = wanted.accepted(film_um, target_um, tolerance)[region]
-        zones = wanted.zones
-        elsewhere_um = (wanted.elsewhere_um or 0.0) if zones else target_um
-        return FilmSummary(
-            film_um,
-            film_statistics(film, area, emitted_cm3, zones=zones and zones.select(region)),
-            film_statistics(
-                film_um, surface.vertex_areas_m2, emitted_cm3, target_um=elsewhere_um,
-                target_tolerance_um=tolerance * elsewhere_um, zones=zones,
-            ),
-            evenness(film, area)[0],
-            evenness(film / wanted.share[region], area)[1],
-            float(area[good].sum() / area.sum()),
-            float(path.dwell_s[path.flow > 0.0].sum()), trajectory.duration_s,
-        )  # fmt: skip
-
-    @property
-    def paint_cm3(self) -> float:
-        """Paint sprayed: solids, as an endless flat panel would get [cm3]."""
-        return self.statistics.emitted_volume_cm3
-
-    def figures(self) -> dict[str, float]:
-        """Figures by name: film where one is wanted, paint and time."""
-        names = ('mean_um', 'sigma_n', 'within', 'spraying_s', 'cycle_s', 'paint_cm3')
-        return {name: getattr(self, name) for name in names} | {
-            'min_um': self.statistics.min_um,
-            'max_um': self.statistics.max_um,
-            'on_part_cm3': self.whole_part.painted_volume_cm3,
-        }
 
 
 @dataclass(frozen=True)
@@ -135,10 +69,10 @@ class Improvement:
     Attributes:
         surface: the part. wanted: the film on the side where it counts.
         model: what the gun sprays. request: objective and limits.
-        original: the motion as it was; trajectory: the improved one.
+        trajectory: the improved motion.
         moves: the improved one as moves of a robot program.
         retiming: how it was found.
-        before, after: films of both motions.
+        before, after: films of the motion as it was and of the improved one.
         program_difference: largest difference between the films of the robot program and of the
             bag, as a share of the greatest film.
         geometry_warnings: oddities of the motion over the part, each with its likely cause.
@@ -149,12 +83,11 @@ class Improvement:
     wanted: WantedFilm
     model: DepositionModel
     request: ImproveRequest
-    original: Trajectory
     trajectory: Trajectory
     moves: Sequence[Move]
     retiming: Retiming
-    before: FilmSummary
-    after: FilmSummary
+    before: LaidFilm
+    after: LaidFilm
     program_difference: float
     geometry_warnings: tuple[str, ...] = ()
     drive: Drive | None = None
@@ -163,24 +96,19 @@ class Improvement:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user on what was done unasked."""
-        if Programme.of(self.original).openings == self.retiming.original.openings:
+        if Programme.of(self.before.trajectory).openings == self.retiming.original.openings:
             return ()
         return (
             'the programme sprays through turns beside the part; the gun is closed there now '
             '(--spray-turns keeps it open)',
         )
 
-    @property
-    def tolerance(self) -> float:
-        """Relative difference from the target that counts as good."""
-        return self.request.tolerance or DEFAULT_TOLERANCE
-
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
         """What changes, pass by pass, numbered as a simulation of the improved programme does."""
         original, improved = self.retiming.original, self.retiming.programme
         ends_m, numbers, begins_pass = strokes_of(improved)
-        given = Programme.of(self.original).openings
+        given = Programme.of(self.before.trajectory).openings
         opened_m, closed_m = {one.on_m for one in given}, {one.off_m for one in given}
         pairs = list(zip(original.openings, improved.openings, strict=True))
         found: list[PassChange] = []
@@ -201,19 +129,15 @@ class Improvement:
             closes = off == last.off_m and last_before.off_m in closed_m
             earlier = first_before.on_m - on if opens else 0.0
             later = off - last_before.off_m if closes else 0.0
-            old, new = (float(speed_along(p, np.array(inside))[0]) for p in (original, improved))
-            speed = speed_along(improved, np.linspace(*inside, 61))
+            old, new = (float(p.speed_between(*inside)) for p in (original, improved))
+            places = np.linspace(*inside, 61)
+            speed = improved.speed_between(places[:-1], places[1:])
             found.append(PassChange(
                 int(number) + 1, (on, off), (old, new), float(speed.min()), float(speed.max()),
                 earlier, later, earlier / float(speed[0]), later / float(speed[-1]),
                 (first_before.flow, first.flow),
             ))  # fmt: skip
         return tuple(found)
-
-    @cached_property
-    def paths(self) -> tuple[SprayPath, SprayPath]:
-        """Both motions cut into sub-steps."""
-        return spray_path(self.original)[0], spray_path(self.trajectory)[0]
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -254,17 +178,17 @@ class Improvement:
         """The film accepted, in words."""
         if self.wanted.zones:
             return 'the band of its zone'
-        return f'±{100 * self.tolerance:g} % of {self.retiming.target_um:.1f} µm'
+        return f'±{100 * self.after.tolerance:g} % of {self.retiming.target_um:.1f} µm'
 
     @property
     def sentence(self) -> str:
         """The improvement in a sentence."""
         a, b = self.before, self.after
-        more = 100.0 * (b.paint_cm3 / a.paint_cm3 - 1.0)
+        more = 100.0 * (b.paint.emitted_cm3 / a.paint.emitted_cm3 - 1.0)
         return (
             f'sigma_n {100 * a.sigma_n:.1f} → {100 * b.sigma_n:.1f} %, within {self.band} '
             f'{100 * a.within:.0f} → {100 * b.within:.0f} % of the area, paint '
-            f'sprayed {more:+.0f} %, {a.cycle_s:.1f} → {b.cycle_s:.1f} s'
+            f'sprayed {more:+.0f} %, {a.cycle_time_s:.1f} → {b.cycle_time_s:.1f} s'
         )
 
     @property
@@ -312,9 +236,20 @@ class Improvement:
 
     def to_dict(self) -> dict[str, Any]:
         """Figures, under the names of ``improvement.json``."""
+        of_film: dict[str, Callable[[LaidFilm], float]] = {
+            'mean_um': lambda of: of.mean_um,
+            'sigma_n': lambda of: of.sigma_n,
+            'within': lambda of: of.within,
+            'spraying_s': lambda of: float(of.path.dwell_s[of.path.flow > 0.0].sum()),
+            'cycle_s': lambda of: of.cycle_time_s,
+            'paint_cm3': lambda of: of.paint.emitted_cm3,
+            'min_um': lambda of: of.statistics.min_um,
+            'max_um': lambda of: of.statistics.max_um,
+            'on_part_cm3': lambda of: of.whole_part.painted_volume_cm3,
+        }
         both = {
-            name: {'before': value, 'after': self.after.figures()[name]}
-            for name, value in self.before.figures().items()
+            name: {'before': figure(self.before), 'after': figure(self.after)}
+            for name, figure in of_film.items()
         }
         films = {'before': self.before, 'after': self.after}
         laid = {when: film.statistics.to_dict().get('zones', []) for when, film in films.items()}
@@ -324,7 +259,7 @@ class Improvement:
             **both,
             'whole_part': {when: film.whole_part.to_dict() for when, film in films.items()},
             'target_um': self.retiming.target_um,
-            'tolerance': self.tolerance,
+            'tolerance': self.after.tolerance,
             'sigma_n_of_path': self.sigma_n_of_path,
             'program_difference': self.program_difference,
             'sentence': self.sentence,

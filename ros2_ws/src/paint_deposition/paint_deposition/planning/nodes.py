@@ -13,7 +13,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.programme import STANDING_M, Opening, Programme
-from paint_deposition.planning.requests import Limits
+from paint_deposition.planning.requests import ImproveRequest
 
 # What limits the speed, as messages call it.
 FASTEST, BEND = 'the greatest speed', 'the speed in bends'
@@ -69,7 +69,9 @@ class Nodes:
         return line.antiderivative()(travel_m)
 
 
-def retime(programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Limits) -> Programme:
+def retime(
+    programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: ImproveRequest
+) -> Programme:
     """The programme at slowness (n,) [s/m] where the gun is open.
 
     Elsewhere it keeps its speed, but for what it takes to reach the speed at which the gun opens
@@ -114,7 +116,7 @@ def retime(programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Lim
 
 
 def speed_bounds(
-    programme: Programme, nodes: Nodes, limits: Limits
+    programme: Programme, nodes: Nodes, limits: ImproveRequest
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n,) how fast the gun may go at the nodes [m/s], and (n,) which limit sets that.
 
@@ -124,7 +126,7 @@ def speed_bounds(
     places, at, length = nodes.travel_m, programme.positions_at_m, programme.travel_m[-1]
     # Half the length over which bends of the path and its programmed speed are measured [m].
     half = 0.02
-    programmed = programme.speed_about(places, half)
+    programmed = programme.speed_between(places - half, places + half)
     inner = np.clip(places, half, length - half)
     bend = at(inner + half) - 2.0 * at(inner) + at(inner - half)
     curvature = np.linalg.norm(bend, axis=1) / half**2
@@ -145,7 +147,7 @@ def speed_bounds(
             step = 0.01
             count = math.ceil(abs(far - end) / step)
             beside = np.linspace(end, far, count + 1)
-            speed = programme.speed_about(beside, step)
+            speed = programme.speed_between(beside - step, beside + step)
             if count < 2 or speed.min() > 0.8 * speed[0]:
                 continue
             slow = np.abs(beside - end)[speed <= 1.05 * speed.min()].min()

@@ -15,30 +15,17 @@ from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.joints import fastest_way, ways_of
 
 
-@dataclass(frozen=True)
-class PartPlace:
-    """The pose of a part in the frame of the robot, and how well it is known.
-
-    ``residuals_m`` are, by point, how far it is from where the pose puts it; with their RMS [m].
-    """
-
-    pose: Rigid
-    rms_m: float
-    residuals_m: Mapping[str, float]
-    warnings: tuple[str, ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Pose, residuals and warnings."""
-        figures = {'part_pose': list(self.pose.values), 'rms_m': self.rms_m}
-        said = {'residuals_m': dict(self.residuals_m), 'warnings': list(self.warnings)}
-        return figures | said
-
-
-def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarray]) -> PartPlace:
+def locate(
+    touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarray]
+) -> dict[str, Any]:
     """The pose that brings points of the part to where they were touched, by least squares.
 
     Both are (3,) [m] by name, in the robot's and in the part's frame; points without a partner are
-    left out. Raises RecordingError for fewer than three in common, or points on a line.
+    left out. Returned are ``part_pose``, x y z [m] and qx qy qz qw; by point, ``residuals_m``, how
+    far it is from where the pose puts it, with their RMS ``rms_m``; and ``warnings``.
+
+    Raises:
+        RecordingError: fewer than three points are in common, or they lie on a line.
     """
     names = [name for name in touched_m if name in points_m]
     if len(names) < 3:
@@ -59,19 +46,23 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
             )
     middle, about = touched.mean(axis=0), points.mean(axis=0)
     turn, _ = Rotation.align_vectors(touched - middle, points - about)
-    pose = Rigid.of([*(middle - turn.apply(about)), *turn.as_quat()])
     apart = np.linalg.norm(turn.apply(points - about) + middle - touched, axis=1)
     rms = float(np.sqrt(np.mean(apart**2)))
-    warnings: tuple[str, ...] = ()
+    warnings = []
     # A misfit above this is warned of [m].
     if rms > 0.002:
         worst = names[int(np.argmax(apart))]
-        warnings = (
+        warnings.append(
             f'the points do not fit, {worst} is off by {apart.max() * 1e3:.1f} mm: touch it '
             'again, and check its name, the units of both tables and that both frames are '
-            'right-handed',
+            'right-handed'
         )
-    return PartPlace(pose, rms, dict(zip(names, apart.tolist(), strict=True)), warnings)
+    return {
+        'part_pose': [*(middle - turn.apply(about)).tolist(), *turn.as_quat().tolist()],
+        'rms_m': rms,
+        'residuals_m': dict(zip(names, apart.tolist(), strict=True)),
+        'warnings': warnings,
+    }
 
 
 @dataclass(frozen=True)

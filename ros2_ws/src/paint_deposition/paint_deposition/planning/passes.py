@@ -49,11 +49,6 @@ class PlannedPass:
     speed_m_per_s: float  # of the TCP while spraying [m/s]
     style: PassStyle  # of all passes of its face
 
-    @property
-    def sprayed_m(self) -> float:
-        """Travel with the gun on [m]."""
-        return self.off_m - self.on_m
-
 
 def plan_pass(
     surface_map: SurfaceMap,
@@ -128,7 +123,7 @@ def trajectory_of(
             float(planned.along_m[-1]), planned.speed_m_per_s, planned.style
         )
         triggers += [clock + reached_s(planned.on_m), clock + reached_s(planned.off_m)]
-        times = _sample_times(duration_s, rate_hz)
+        times = np.linspace(0.0, duration_s, max(2, math.ceil(duration_s * rate_hz) + 1))
         legs.append((clock + times, *_poses_at(planned, travel_m(times))))
         clock += duration_s
     stamps_s, positions_m, quaternions = map(np.concatenate, zip(*legs, strict=True))
@@ -207,7 +202,7 @@ def _transfer(
     duration = max(ramp_s, angle / math.radians(90.0))
     if duration == 0.0:
         return (np.empty(0), np.empty((0, 3)), np.empty((0, 4))), 0.0
-    times = _sample_times(duration, rate_hz)
+    times = np.linspace(0.0, duration, max(2, math.ceil(duration * rate_hz) + 1))
     share = times / duration
     if length > 0.0:
         share = travel_m(share * ramp_s) / length
@@ -222,9 +217,3 @@ def _poses_at(planned: PlannedPass, way_m: np.ndarray) -> tuple[np.ndarray, np.n
     )
     turns = Slerp(planned.along_m, Rotation.from_matrix(planned.rotations))
     return positions, turns(np.clip(way_m, 0.0, planned.along_m[-1])).as_quat()
-
-
-def _sample_times(duration_s: float, rate_hz: float) -> np.ndarray:
-    """Times at about this rate, both ends included."""
-    count = max(2, math.ceil(duration_s * rate_hz) + 1)
-    return np.linspace(0.0, duration_s, count)

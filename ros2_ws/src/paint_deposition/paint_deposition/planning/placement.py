@@ -266,12 +266,6 @@ def place_passes(
     return good[0]
 
 
-def placement_at(films: LineFilms, passes: int, index_m: float, middle_m: float) -> Placement:
-    """Lines with sigma_n of their film."""
-    sigma_n = float(films.sigma_n(lines_of(passes, index_m, middle_m)))
-    return Placement(passes, index_m, middle_m, sigma_n)
-
-
 def best_placement(
     films: LineFilms,
     extent_m: tuple[float, float],
@@ -310,4 +304,6 @@ def best_placement(
         options={'xatol': 1e-4, 'fatol': 1e-5, 'maxfev': 200, 'initial_simplex': first + aside},
     )
     there = float(np.clip(found.x[0], low, high))
-    return placement_at(films, passes, there, middle + float(found.x[1]) * there)
+    middle += float(found.x[1]) * there
+    sigma_n = float(films.sigma_n(lines_of(passes, there, middle)))
+    return Placement(passes, there, middle, sigma_n)

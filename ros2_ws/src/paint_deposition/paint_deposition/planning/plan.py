@@ -24,16 +24,13 @@ from paint_deposition.planning.placement import (
     LineFilms,
     Placement,
     best_placement,
-    passes_to_cover,
     place_passes,
-    placement_at,
 )
 from paint_deposition.planning.planned_film import (
+    LaidFilm,
     PlannedFilm,
     WantedFilm,
     contacts,
-    evenness,
-    predicted,
     simulated,
 )
 from paint_deposition.planning.programme import Programme, moves_of
@@ -53,7 +50,6 @@ class Plan(PlannedFilm):
         style: how passes are run.
         placement: number, index and place of the passes, with sigma_n of the search.
         plane: recommendation for a plane of the part's size.
-        plane_on_part: its passes laid about the middle of this part.
         line_films: films of single passes, for other placings.
         unoptimised: of an optimised plan, the plan that it started from; else None.
     """
@@ -61,7 +57,6 @@ class Plan(PlannedFilm):
     style: PassStyle
     placement: Placement
     plane: Recommendation
-    plane_on_part: Placement
     line_films: LineFilms
     unoptimised: 'Plan | None' = None
 
@@ -75,15 +70,6 @@ class Plan(PlannedFilm):
         return (
             f'{len(self.passes)} {self.request.direction} passes at '
             f'{self.placement.index_m * 1e3:.0f} mm, {speeds}: {super().sentence}'
-        )
-
-    @property
-    def comparison(self) -> str:
-        """sigma_n of the passes for a plane: on the plane, and on this part, in a sentence."""
-        return (
-            f'on a plane: sigma_n {100 * self.plane.sigma_n:.1f} % at '
-            f'{self.plane.index_m * 1e3:.0f} mm; those passes about the middle of this part: '
-            f'{100 * self.plane_on_part.sigma_n:.1f} %'
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -107,12 +93,6 @@ class Plan(PlannedFilm):
                 'passes': self.unoptimised.placement.passes,
                 'capture_fraction': self.unoptimised.statistics.capture_fraction,
             },
-            'plane': {
-                'index_m': self.plane.index_m,
-                'passes': self.plane_on_part.passes,
-                'sigma_n': self.plane.sigma_n,
-                'sigma_n_on_part': self.plane_on_part.sigma_n,
-            },
         }
 
 
@@ -134,7 +114,6 @@ def plan(
     axes = pass_axes(surface, request.direction, request.outward)
     surface_map = SurfaceMap(surface, axes, request.smoothing_radius_m)
     wanted = WantedFilm.of(surface, surface_map.painted, request.target_um, zones)
-    area = surface.vertex_areas_m2[wanted.region]
     (left, right), ends = surface_map.extent_m.tolist()
     height = ends[1] - ends[0]
     # Speeds along the passes may make a film even that is not at one speed.
@@ -151,30 +130,27 @@ def plan(
         0.5 * plane.sb50_m, lambda share: progress('single passes', share),
     )  # fmt: skip
     placement = place_passes(films, ends, request.index_range_m(plane.index_m), tolerance)
-    count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
-    on_part = placement_at(films, count, plane.index_m, 0.5 * (ends[0] + ends[1]))
     target = None if request.speed_m_per_s else wanted.target_um
     rounds = 4
     for round_ in range(rounds):
         passes = plan_passes(surface_map, placement.lines_m(request.direction), style)
-        found = predicted(
-            surface, model, request, wanted,
-            trajectory_of(passes, frame_id), lambda share: progress('film', share),
-        )  # fmt: skip
-        mean, _ = evenness(found['film_um'][wanted.region], area)
-        ratio = mean / target if target else 1.0
+        trajectory = trajectory_of(passes, frame_id)
+        film = simulated(surface, model, trajectory, lambda share: progress('film', share))
+        laid = LaidFilm.of(surface, wanted, trajectory, *film)
+        ratio = laid.mean_um / target if target else 1.0
         if abs(ratio - 1.0) <= 2e-3 or round_ == rounds - 1:
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
-    if tolerance is not None and found['sigma_n'] > tolerance:
+    if tolerance is not None and laid.sigma_n > tolerance:
         raise PlanError(
             f'{len(passes)} passes at {placement.index_m:.3f} m lay a film of sigma_n '
-            f'{100 * found["sigma_n"]:.2f} %, not within {100 * tolerance:g} %: allow that much, '
+            f'{100 * laid.sigma_n:.2f} %, not within {100 * tolerance:g} %: allow that much, '
             'or a smaller index, or choose speeds along the passes (--optimise)'
         )
     return Plan(
-        **found, passes=passes, moves=tuple(planned_moves(passes)), style=style,
-        placement=placement, plane=plane, plane_on_part=on_part, line_films=films,
+        **vars(laid), surface=surface, model=model, request=request, wanted=wanted,
+        passes=passes, moves=tuple(planned_moves(passes)), style=style, placement=placement,
+        plane=plane, line_films=films,
     )  # fmt: skip
 
 
@@ -275,13 +251,11 @@ def _timed_plan(
         trajectory_of(passes, unoptimised.trajectory.frame_id),
         request.target_um if zones else target_um, wanted_cm3, unoptimised.cycle_time_s, progress,
     )  # fmt: skip
-    found = predicted(
-        surface, model, request, unoptimised.wanted, trajectory,
-        lambda share: progress('film', share),
-    )  # fmt: skip
+    film = simulated(surface, model, trajectory, lambda share: progress('film', share))
+    laid = LaidFilm.of(surface, unoptimised.wanted, trajectory, *film)
     return replace(
-        unoptimised, **found, style=style, passes=passes, moves=moves,
-        placement=replace(placement, sigma_n=found['sigma_n']), unoptimised=unoptimised,
+        unoptimised, **vars(laid), style=style, passes=passes, moves=moves,
+        placement=replace(placement, sigma_n=laid.sigma_n), unoptimised=unoptimised,
     )  # fmt: skip
 
 
@@ -296,14 +270,14 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     request, trajectory = planned.request, planned.trajectory
     quarter = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi])
     turned = (Rotation.from_quat(trajectory.quaternions_xyzw) * quarter).as_quat()
-    film_um, _ = simulated(
-        planned.surface, planned.model, replace(trajectory, quaternions_xyzw=turned)
-    )
+    surface, model = planned.surface, planned.model
+    film_um, _ = simulated(surface, model, replace(trajectory, quaternions_xyzw=turned))
     # It is round if a quarter turn of the tool changes the film by less than 1e-3 of its peak.
     changed_um = np.abs(film_um - planned.film_um).max()
     drive = cell.drive(trajectory, bool(changed_um < 1e-3 * planned.film_um.max()))
-    found = predicted(planned.surface, planned.model, request, planned.wanted, drive.trajectory)
-    sigma_n, most = found['sigma_n'], request.tolerance
+    film = simulated(surface, model, drive.trajectory)
+    laid = LaidFilm.of(surface, planned.wanted, drive.trajectory, *film)
+    sigma_n, most = laid.sigma_n, request.tolerance
     if most is not None and sigma_n > most:
         raise PlanError(
             f'as the robot drives it sigma_n is {100 * sigma_n:.2f} %, where a tolerance of '
@@ -314,7 +288,7 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     shortest_m = WAYPOINT_STEP_M * WAYPOINTS_PER_MOVE
     wanted = request.improvement(0.0, request.target_um, move_min_m=shortest_m)
     moves = tuple(moves_of(Programme.of(drive.trajectory), wanted))
-    return replace(planned, **found, moves=moves, drive=drive)
+    return replace(planned, **vars(laid), moves=moves, drive=drive)
 
 
 def kept_clear(planned: Planned, envelope: GunEnvelope) -> Planned:

@@ -32,6 +32,8 @@ from paint_deposition.planning.joints import rows_apart
 from paint_deposition.planning.passes import PlannedPass
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 
+# Difference from the target, as a share of it, within which a film is good.
+DEFAULT_TOLERANCE = 0.1
 # Some of V points, (V,) bool, the film wanted there [um], and the share of it that is accepted
 # either way; None: any film.
 Band = tuple[np.ndarray, float, float | None]
@@ -131,34 +133,59 @@ def simulated(
     return integrator.film_um, integrator.used
 
 
-def predicted(
-    surface: Surface,
-    model: DepositionModel,
-    request: PlanRequest,
-    wanted: WantedFilm,
-    trajectory: Trajectory,
-    progress: Callable[[float], None] = lambda share: None,
-) -> dict[str, Any]:
-    """The film of a planned motion and its figures, as fields of a ``PlannedFilm``.
+@dataclass(frozen=True)
+class LaidFilm:
+    """The film that a motion lays on a part, and the paint and time spent on it.
 
-    Within a tenth of the target, if there is one, it is good; in zones within their tolerance.
+    Mean, evenness and share within the tolerance are by area, bare metal included.
     """
-    film, paint = simulated(surface, model, trajectory, progress)
-    region, target = wanted.region, request.target_um or 0.0
-    statistics, whole_part = (
-        film_statistics(
-            film[rows], surface.vertex_areas_m2[rows], paint.emitted_cm3, target_um=target,
-            target_tolerance_um=0.1 * target, zones=wanted.zones and wanted.zones.select(rows),
-        )
-        for rows in (region, np.ones_like(region))
-    )  # fmt: skip
-    area = surface.vertex_areas_m2[region]
-    return {
-        'surface': surface, 'model': model, 'request': request, 'wanted': wanted,
-        'trajectory': trajectory, 'film_um': film, 'paint': paint, 'statistics': statistics,
-        'whole_part': whole_part,
-        'sigma_n': evenness(film[region] / wanted.share[region], area)[1],
-    }  # fmt: skip
+
+    trajectory: Trajectory  # timed poses and trigger
+    film_um: np.ndarray  # (V,) at the vertices of the surface
+    paint: PaintUsed
+    statistics: FilmStatistics  # of the film where one is wanted, with those of its zones
+    whole_part: FilmStatistics  # of the film on the whole part
+    mean_um: float  # where a film is wanted
+    sigma_n: float  # standard deviation over mean there, of the film over its own target
+    within: float  # share of the area there within the tolerance
+    tolerance: float  # difference from the target that is accepted, as a share of it
+
+    @staticmethod
+    def of(
+        surface: Surface,
+        wanted: WantedFilm,
+        trajectory: Trajectory,
+        film_um: np.ndarray,
+        paint: PaintUsed,
+        tolerance: float = DEFAULT_TOLERANCE,
+    ) -> LaidFilm:
+        """Summarise a film (V,) [um]; outside of zones the target and the tolerance hold."""
+        region, target_um = wanted.region, wanted.elsewhere_um or 0.0
+        statistics, whole_part = (
+            film_statistics(
+                film_um[rows], surface.vertex_areas_m2[rows], paint.emitted_cm3,
+                target_um=target_um, target_tolerance_um=tolerance * target_um,
+                zones=wanted.zones and wanted.zones.select(rows),
+            )
+            for rows in (region, np.ones_like(region))
+        )  # fmt: skip
+        film, area = film_um[region], surface.vertex_areas_m2[region]
+        good = wanted.accepted(film_um, target_um, tolerance)[region]
+        return LaidFilm(
+            trajectory, film_um, paint, statistics, whole_part, evenness(film, area)[0],
+            evenness(film / wanted.share[region], area)[1], float(area[good].sum() / area.sum()),
+            tolerance,
+        )  # fmt: skip
+
+    @cached_property
+    def path(self) -> SprayPath:
+        """The motion cut into sub-steps."""
+        return spray_path(self.trajectory)[0]
+
+    @property
+    def cycle_time_s(self) -> float:
+        """From the first pose to the last [s]."""
+        return self.trajectory.duration_s
 
 
 @dataclass(frozen=True)
@@ -228,7 +255,7 @@ def contacts(
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlannedFilm:
+class PlannedFilm(LaidFilm):
     """Passes on a part with the film that the model predicts."""
 
     surface: Surface
@@ -236,23 +263,10 @@ class PlannedFilm:
     request: PlanRequest
     wanted: WantedFilm  # on the side or the faces that are painted
     passes: tuple[PlannedPass, ...]  # in running order
-    trajectory: Trajectory  # their timed poses and trigger
     moves: tuple[Move, ...]  # of a robot program along them
-    film_um: np.ndarray  # (V,) on the refined part
-    paint: PaintUsed
-    statistics: FilmStatistics  # of the film where one is wanted
-    whole_part: FilmStatistics  # of the film on the whole part
-    # Standard deviation over mean there, of the film over its own target, bare metal included.
-    sigma_n: float
     drive: Drive | None = None  # of the robot that it was made for
     contacts: tuple[Contact, ...] = ()  # where gun or spray come too close to the part
     envelope: GunEnvelope = field(default_factory=GunEnvelope)  # of the gun
-
-    @property
-    def mean_um(self) -> float:
-        """Mean film on the painted part, bare metal included [um]."""
-        region = self.wanted.region
-        return evenness(self.film_um[region], self.surface.vertex_areas_m2[region])[0]
 
     @property
     def region(self) -> str:
@@ -261,19 +275,9 @@ class PlannedFilm:
         return f'the {area_m2:.2f} of {self.surface.area_m2:.2f} m2 to be painted'
 
     @property
-    def cycle_time_s(self) -> float:
-        """From the first pose to the last [s]."""
-        return self.trajectory.duration_s
-
-    @property
     def sprayed_speeds_m_per_s(self) -> list[float]:
         """Speeds of the moves that spray."""
         return [move.speed_m_per_s for move in self.moves if move.spraying]
-
-    @cached_property
-    def path(self) -> SprayPath:
-        """The motion cut into sub-steps."""
-        return spray_path(self.trajectory)[0]
 
     @property
     def sentence(self) -> str:

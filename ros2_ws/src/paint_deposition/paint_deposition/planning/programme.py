@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import PlanError
@@ -100,10 +101,9 @@ class Programme:
         columns = [np.interp(travel_m, self._rising_m, column) for column in self.positions_m.T]
         return np.stack(columns, axis=1)
 
-    def speed_about(self, travel_m: np.ndarray, half_m: float) -> np.ndarray:
-        """(n,) mean speed [m/s] within ``half_m`` of lengths of travel (n,)."""
-        low, high = travel_m - half_m, travel_m + half_m
-        low, high = np.maximum(low, 0.0), np.minimum(high, self.travel_m[-1])
+    def speed_between(self, low_m: ArrayLike, high_m: ArrayLike) -> np.ndarray:
+        """(n,) mean speed [m/s] between lengths of travel (n,), those beyond its ends left out."""
+        low, high = np.maximum(low_m, 0.0), np.minimum(high_m, self.travel_m[-1])
         return (high - low) / np.maximum(self.seconds_at(high) - self.seconds_at(low), 1e-9)
 
     def turns_at_s(self, seconds: np.ndarray) -> Rotation:
@@ -212,11 +212,6 @@ def closed_beside(programme: Programme, surface: Surface) -> Programme:
     return replace(programme, openings=openings)
 
 
-def speed_along(programme: Programme, travel_m: np.ndarray) -> np.ndarray:
-    """(N - 1,) mean speed between places (N,) of the path [m/s]."""
-    return np.diff(travel_m) / np.maximum(np.diff(programme.seconds_at(travel_m)), 1e-9)
-
-
 def _openings(
     trajectory: Trajectory, stamps_ns: np.ndarray, travel_m: np.ndarray, max_pose_gap_s: float
 ) -> tuple[Opening, ...]:
@@ -252,7 +247,7 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
     for on_m, off_m in ends:
         # Moves are neither too short in length nor in time; the speed is sampled so often.
         places = np.linspace(on_m, off_m, 401)
-        speed = speed_along(programme, places)
+        speed = programme.speed_between(places[:-1], places[1:])
         least = np.maximum(request.move_min_m, speed / request.settings_per_s)
         count = np.append(0.0, np.cumsum(np.diff(places) / least))
         whole_moves = np.linspace(0.0, count[-1], max(2, int(count[-1]) + 1))

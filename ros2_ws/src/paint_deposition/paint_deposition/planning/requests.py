@@ -61,6 +61,13 @@ class PassRequest(FilmBuild):
     )
 
 
+# What the robot allows while the speeds along a path are chosen.
+ACCELERATION = given(
+    2.0, 'Acceleration of the robot along its path, and across it in bends [m/s2].',
+    '--acceleration', above=0.0,
+)  # fmt: skip
+
+
 class SpeedLimits(Request):
     """How fast and how slow the gun may go."""
 
@@ -126,18 +133,10 @@ class IndexRequest(SpeedLimits, PassRequest):
         return low, high
 
 
-class Limits(SpeedLimits):
-    """What robot, gun and shop allow while the speeds along a path are chosen."""
-
-    acceleration_m_per_s2: float = given(
-        2.0, 'Acceleration of the robot along its path, and across it in bends [m/s2].',
-        '--acceleration', above=0.0,
-    )  # fmt: skip
-
-
-class PlanRequest(Limits, PassRequest):
+class PlanRequest(SpeedLimits, PassRequest):
     """Passes on a part; the speeds along them are chosen for ``optimise`` only, and for zones."""
 
+    acceleration_m_per_s2: float = ACCELERATION
     direction: Literal['horizontal', 'vertical'] = given('horizontal', 'How the passes run.')
     index_m: float | None = given(
         None, 'Index between passes [m]; default: the most even one.', '--index',
@@ -207,7 +206,8 @@ class PlanRequest(Limits, PassRequest):
         ``paint`` is that of the passes to begin with over that of the film on the part, ``time``
         that with the gun open over the whole of the plan without speeds along its passes.
         """
-        limits = {name: getattr(self, name) for name in Limits.model_fields}
+        names = (*SpeedLimits.model_fields, 'acceleration_m_per_s2')
+        limits = {name: getattr(self, name) for name in names}
         return ImproveRequest(
             **limits, target_um=target_um, trigger_cut_m=overspray_m,
             paint_weight=paint * self.paint_weight, time_weight=time * self.time_weight, **others,
@@ -222,13 +222,14 @@ class PlanRequest(Limits, PassRequest):
         )  # fmt: skip
 
 
-class ImproveRequest(Limits):
+class ImproveRequest(SpeedLimits):
     """A more even film along the path of a programme: what is wanted, and what is allowed.
 
     The variance of film / target on the part is minimised, which is sigma_n squared where the
     mean is on target, and these weights times what they weigh.
     """
 
+    acceleration_m_per_s2: float = ACCELERATION
     target_um: float | None = given(
         None, 'Mean film wanted [µm]; default: that of the programme.', above=0.0
     )

@@ -123,13 +123,14 @@ def retime_for_evenness(
     if explain:
         for number, name in enumerate(found.binding):
             progress('limits', number / len(found.binding))
-            without = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
+            freed = replace(problem, left_out=frozenset({name}))
+            without = _sigma_n(freed.films_um(solve(freed, found, ROUGH_ROUNDS)))
             # A limit is reported if sigma_n would be lower by 2 % without it.
             if without < 0.98 * now:
                 limits[name] = without
         limits = dict(sorted(limits.items(), key=lambda limit: limit[1]))
-        free = [(problem, found), *free]
-        of_path = min(now, *(_solved_sigma_n(one.relaxed(), start) for one, start in free))
+        for one, start in ((problem.relaxed(), found), *((one.relaxed(), s) for one, s in free)):
+            of_path = min(of_path, _sigma_n(one.films_um(solve(one, start, ROUGH_ROUNDS))))
     return Retiming(original, timed, target_um, found.binding, limits, of_path)
 
 
@@ -150,7 +151,7 @@ def timed_evenly(
     The weights of the request are for the paint that the passes spray over the paint wanted, and
     for the time that they spray over the cycle time of the plan to begin with.
     """
-    sprayed_s = sum(one.sprayed_m / one.speed_m_per_s for one in passes)
+    sprayed_s = sum((one.off_m - one.on_m) / one.speed_m_per_s for one in passes)
     asked = request.improvement(
         passes[0].style.overspray_m, target_um,
         paint=model.planar.K1_cm3_per_s * sprayed_s / wanted_cm3, time=sprayed_s / cycle_time_s,
@@ -160,11 +161,6 @@ def timed_evenly(
         surface, wanted, original, [model], asked, progress, explain=False
     ).programme
     return retimed.trajectory(), tuple(moves_of(retimed, asked))
-
-
-def _solved_sigma_n(problem: Problem, start: Density) -> float:
-    """Root mean square over the models of sigma_n, at the solution."""
-    return _sigma_n(problem.films_um(solve(problem, start, ROUGH_ROUNDS)))
 
 
 def _sigma_n(films_um: Sequence[np.ndarray]) -> float:

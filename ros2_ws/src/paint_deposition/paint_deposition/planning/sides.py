@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,6 +54,10 @@ class SurfaceMap:
     The axes are those of ``pass_axes``, from the middle of the part. About each place a plane is
     fitted to the surface with Gaussian weights of half the radius [m].
     Past the part's edges height and slope go over to what they are at the edge.
+
+    Attributes:
+        painted: (V,) bool, vertices of the painted side.
+        extent_m: (2, 2) least and greatest coordinate along travel and across [m].
     """
 
     def __init__(self, surface: Surface, axes: np.ndarray, radius_m: float) -> None:
@@ -71,8 +74,9 @@ class SurfaceMap:
         cell = min(max(radius_m / 5.0, 0.004), 0.02)
         cell = max(cell, surface.longest_edge_m)
         margin = 3.0 * radius_m + 2.0 * cell
-        low = self.surface_m[:, :2].min(axis=0) - margin
-        high = self.surface_m[:, :2].max(axis=0) + margin
+        least, most = self.surface_m[:, :2].min(axis=0), self.surface_m[:, :2].max(axis=0)
+        self.extent_m = np.stack([least, most], axis=1)
+        low, high = least - margin, most + margin
         cell = max(cell, math.sqrt(float(np.prod(high - low)) / 1_000_000))
         count = np.ceil((high - low) / cell).astype(int) + 1
         self._lines = [low[k] + cell * np.arange(count[k]) for k in range(2)]
@@ -96,13 +100,6 @@ class SurfaceMap:
         """(N, 3) places on the smoothed surface, in the part's frame [m]."""
         height_m = self.height_m(travel_m, across_m)
         return self.origin_m + np.stack([travel_m, across_m, height_m], axis=1) @ self.axes
-
-    @cached_property
-    def extent_m(self) -> np.ndarray:
-        """(2, 2) least and greatest coordinate along travel and across [m]."""
-        return np.stack(
-            [self.surface_m[:, :2].min(axis=0), self.surface_m[:, :2].max(axis=0)], axis=1
-        )
 
     def extent_near_m(self, across_m: float, band_m: float) -> tuple[float, float]:
         """Ends along travel of the surface in a band about a line; of the nearest if none is."""

@@ -1,7 +1,7 @@
 """What the report shows, computed once from the results, and the rows of its tables."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from functools import cached_property
 from itertools import pairwise, product
 from typing import Any
@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
 from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedLaw, LearnedMap
 from paint_deposition.film.common_film import sum_um
@@ -22,7 +21,6 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import root_mean_square
 from paint_deposition.report import words
 from paint_deposition.report.colour_scales import ACCENT, BEFORE, INK, MODELS, TWO_SIDED_95
@@ -39,39 +37,58 @@ SYMBOLS = {
 }
 
 
-@dataclass(frozen=True)
 class ReportData:
-    """Everything the report is made of."""
+    """Everything the report is made of; what takes time is computed once, where it is shown.
 
-    # Of the first and the best model; one where nothing was added.
-    comparisons: tuple[Comparison, ...]
-    diagnosis: Diagnosis | None = None  # or None after a comparison alone
-    # History of the model that a diagnosis started from, as in its file.
-    older: Sequence[Mapping[str, Any]] = ()
-    # Of models that stand side by side; none where one model followed from another.
-    names: tuple[str, ...] = ()
+    Attributes:
+        comparisons: of the first and the best model of a diagnosis; one where nothing was added;
+            of models side by side each.
+        diagnosis: None after a comparison alone.
+        older: history of the model that a diagnosis started from, as in its file.
+        names: of models that stand side by side; none where one model followed from another.
+        models: base first, best last. model: the best one.
+        improved: whether there is a before and an after.
+        model_names: what the models are called where both are shown.
+        colours: of the models; a model before is paler than the one after it.
+        lines: colour and width [px] of each model's line over readings. The line of a model before
+            is thin and lies over the bold one, so that both are seen where they agree.
+        residuals_um: for each model (P,) at the points, averaged over repeats [um].
+        proposals: what to measure and what to spray next.
+    """
 
-    @staticmethod
-    def of(
-        result: Comparison | SideBySide | Diagnosis, older: Sequence[Mapping[str, Any]] = ()
-    ) -> 'ReportData':
-        """Gather what the report shows; of a diagnosis, the first and the last model."""
+    def __init__(
+        self,
+        result: Comparison | SideBySide | Diagnosis,
+        older: Sequence[Mapping[str, Any]] = (),
+    ) -> None:
+        self.older = older
+        self.names: tuple[str, ...] = ()
+        self.diagnosis: Diagnosis | None = None
+        self.comparisons: tuple[Comparison, ...]
+        self.proposals: tuple[Sequence[Place], Sequence[Spray]] = ((), ())
         if isinstance(result, SideBySide):
-            return ReportData(tuple(result.by_name.values()), names=tuple(result.by_name))
-        if isinstance(result, Comparison):
-            return ReportData((result,))
-        first, *later = result.comparisons
-        return ReportData((first, *later[-1:]), result, older)
-
-    @property
-    def study(self) -> Study:
-        """The readings."""
-        return self.comparisons[0].study
-
-    @property
-    def experiments(self) -> tuple[Experiment, ...]:
-        """The experiments of the campaign."""
-        return self.study.campaign.experiments
+            self.names = tuple(result.by_name)
+            self.comparisons = tuple(result.by_name.values())
+        elif isinstance(result, Comparison):
+            self.comparisons = (result,)
+        else:
+            first, *later = result.comparisons
+            self.comparisons = (first, *later[-1:])
+            self.diagnosis, self.proposals = result, result.proposals
+        self.study = self.comparisons[0].study
+        self.experiments = self.study.campaign.experiments
+        self.models = tuple(comparison.model for comparison in self.comparisons)
+        self.residuals_um = [comparison.points.residual_um for comparison in self.comparisons]
+        self.model, count = self.models[-1], len(self.models)
+        self.improved = count > 1 and not self.names
+        self.model_names: tuple[str, ...] = self.names or ('model',)
+        self.colours: tuple[str, ...] = MODELS[:count]
+        self.lines: list[dict[str, Any]] = [{'color': ACCENT, 'width': 3.5}]
+        if self.improved:
+            self.model_names, self.colours = ('model before', 'model after'), (BEFORE, ACCENT)
+            self.lines.insert(0, {'color': INK, 'width': 1.2})
+        elif self.names:
+            self.lines = [{'color': colour, 'width': 2.2} for colour in self.colours]
 
     @cached_property
     def bands(self) -> list[str]:
@@ -84,48 +101,6 @@ class ReportData:
             within = np.where(np.abs(off) <= tolerance, 'in', np.where(off < 0.0, 'low', 'high'))
             bands += np.where(np.isnan(off), '', within).tolist()
         return bands
-
-    @property
-    def models(self) -> tuple[DepositionModel, ...]:
-        """Base first, best last."""
-        return tuple(comparison.model for comparison in self.comparisons)
-
-    @property
-    def model(self) -> DepositionModel:
-        """The best model."""
-        return self.models[-1]
-
-    @property
-    def improved(self) -> bool:
-        """Whether there is a before and an after."""
-        return len(self.models) > 1 and not self.names
-
-    @property
-    def model_names(self) -> tuple[str, ...]:
-        """What the models are called where both are shown."""
-        return self.names or (('model before', 'model after') if self.improved else ('model',))
-
-    @property
-    def colours(self) -> tuple[str, ...]:
-        """Colours of the models; a model before is paler than the one after it."""
-        return MODELS[: len(self.models)] if self.names else (BEFORE, ACCENT)[-len(self.models) :]
-
-    @property
-    def lines(self) -> list[dict[str, Any]]:
-        """Colour and width [px] of each model's line over readings.
-
-        The line of a model before is thin and lies over the bold one, so that both are seen where
-        they agree.
-        """
-        if self.names:
-            return [{'color': colour, 'width': 2.2} for colour in self.colours]
-        lines = [{'color': INK, 'width': 1.2}, {'color': ACCENT, 'width': 3.5}]
-        return lines[-len(self.models) :]
-
-    @property
-    def proposals(self) -> tuple[Sequence[Place], Sequence[Spray]]:
-        """What to measure and what to spray next."""
-        return self.diagnosis.proposals if self.diagnosis else ((), ())
 
     @cached_property
     def changes(self) -> dict[str, dict[str, float]]:
@@ -149,11 +124,6 @@ class ReportData:
         """An effect that was looked for or is in the models; None if it is neither."""
         own = {e.id: type(e) for model in self.models for e in model.effects}
         return (own | dict(self.diagnosis.library if self.diagnosis else {})).get(effect_id)
-
-    @cached_property
-    def residuals_um(self) -> list[np.ndarray]:
-        """For each model (P,) at the points, averaged over repeats [um]."""
-        return [c.points.residual_um for c in self.comparisons]
 
     @cached_property
     def profiles(self) -> list[Profile]:

@@ -19,7 +19,7 @@ from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.part_places import PartPlaces
-from paint_deposition.planning.programme import STANDING_M, speed_along
+from paint_deposition.planning.programme import STANDING_M
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.colour_scales import (
     ACCENT,
@@ -232,17 +232,18 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     top, bottom = figure.subfigures(2, 1, height_ratios=[above, below])
     axes = top.subplots(1, 2, sharex=True, sharey=True)
     scale = _scale(result)
-    films = zip(axes, result.paths, (result.before, result.after), strict=True)
-    for name, (one, driven, laid) in zip(('before', 'after'), films, strict=True):
+    films = zip(('before', 'after'), axes, (result.before, result.after), strict=True)
+    for name, one, laid in films:
         part.dress(one, low, high)
         part.draw(one, scale.rgba(laid.film_um, laid.film_um > 1.0))
-        part.draw_zones(one, result.wanted.zones, driven)
-        draw_tool_path(one, driven, part.view, low, high)
-        s, more = laid.statistics, laid.paint_cm3 / result.before.paint_cm3 - 1.0
+        part.draw_zones(one, result.wanted.zones, laid.path)
+        draw_tool_path(one, laid.path, part.view, low, high)
+        s, first = laid.statistics, result.before.paint
+        more = laid.paint.emitted_cm3 / first.emitted_cm3 - 1.0
         paint = 'paint sprayed ' + (f'{100 * more:+.0f} %' if abs(more) >= 5e-3 else 'as before')
         title = (
             f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
-            f'{s.min_um:.1f} to {s.max_um:.1f} µm, {paint}, {laid.cycle_s:.1f} s'
+            f'{s.min_um:.1f} to {s.max_um:.1f} µm, {paint}, {laid.cycle_time_s:.1f} s'
         )
         one.set_title(title, loc='left', fontsize=11, color=INK)
     axes[1].set_ylabel('')
@@ -266,7 +267,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
         places = np.linspace(begin + STANDING_M, end - STANDING_M, 121)
         middle = 0.5 * (places[1:] + places[:-1]) - begin
         for name, programme, colour in programmes:
-            speed = speed_along(programme, places)
+            speed = programme.speed_between(places[:-1], places[1:])
             chart.plot(middle, speed, color=colour, linewidth=1.6, label=name)
         quiet(chart, 'along the pass [m]', '', f'pass {change.number}', size=9.0)
     for chart in charts[:, 0]:
@@ -279,16 +280,16 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
 def improved_figures(result: Improvement) -> list[Figure]:
     """The film before and after for a page, in one scale."""
     part, scale = PartPicture.of(result.surface), _scale(result)
-    films = zip(('before', 'after'), (result.before, result.after), result.paths, strict=True)
+    films = {'before': result.before, 'after': result.after}
     return [
-        page_film(part, of.film_um, path, name, scale, _window(part, result))[0]
-        for name, of, path in films
+        page_film(part, of.film_um, of.path, name, scale, _window(part, result))[0]
+        for name, of in films.items()
     ]
 
 
 def _window(part: PartPicture, result: Improvement) -> tuple[np.ndarray, np.ndarray]:
     """Corners of a picture that holds the passes of both programmes [m]."""
-    lows, highs = zip(*(part.window(path) for path in result.paths), strict=True)
+    lows, highs = zip(*(part.window(of.path) for of in (result.before, result.after)), strict=True)
     return np.minimum(*lows), np.maximum(*highs)
 
 

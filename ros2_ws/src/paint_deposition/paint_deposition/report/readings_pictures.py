@@ -10,6 +10,7 @@ from matplotlib.gridspec import GridSpec
 
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.pass_film import sampled_collapse
+from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.regions import interpolate_over_surface
 from paint_deposition.inference.design.reading_choice import ChosenReadings
@@ -188,24 +189,17 @@ def _draw_film(axes: Axes, data: ReportData, profile: Profile) -> None:
 def write_calibration_pictures(
     folder: str | Path, calibration: Calibration, suffix: str = 'png'
 ) -> list[Path]:
-    """Write what the campaign allows: ``collapse.png``, ``profiles.png``, ``agreement.png``."""
-    folder = Path(folder)
-    written = []
-    panels = [(k, panel) for k, panel in enumerate(calibration.panels) if panel is not None]
+    """Write ``profiles.png``, ``agreement.png`` and, with a panel, ``collapse.png``."""
+    folder, study = Path(folder), calibration.study
+    data = ReportData(compare(study, calibration.model))
+    written = [save_picture(comparison_figure(data), folder / f'profiles.{suffix}')]
+    panels = [panel for panel in calibration.panels if panel is not None]
     if panels:
         figure = new_figure(6.4, 4.2)
-        draw_collapse(figure.subplots(), calibration, panels[0][1])
+        draw_collapse(figure.subplots(), calibration, panels[0])
         written.append(save_picture(figure, folder / f'collapse.{suffix}'))
-        figure = new_figure(8.0, 2.6 * len(panels) + 0.4)
-        rows = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-        for axes, (number, panel) in zip(rows, panels, strict=True):
-            draw_panel(axes, calibration, number, panel)
-        for axes in rows[:-1]:
-            axes.set_xlabel('')
-        legend(rows[0], loc='lower center', ncols=2)
-        written.append(save_picture(figure, folder / f'profiles.{suffix}'))
     figure = new_figure(5.2, 5.0)
-    study, predicted_um = calibration.study, calibration.fit.predicted_um
+    predicted_um = calibration.fit.predicted_um
     draw_agreement(figure.subplots(), study.measured_um, predicted_um, study.sigma_um)
     return [*written, save_picture(figure, folder / f'agreement.{suffix}')]
 
@@ -231,32 +225,6 @@ def draw_collapse(axes: Axes, calibration: Calibration, one: PanelFit) -> None:
     axes.set_xlim(MM * x[0], MM * x[-1])
     axes.set_ylim(bottom=0.0)
     legend(axes, loc='upper right')
-
-
-def draw_panel(axes: Axes, calibration: Calibration, number: int, one: PanelFit) -> None:
-    """Draw the film across a panel, an experiment of this number, as measured and as predicted."""
-    study, panel = calibration.study, one.panel
-    rows = study.campaign.experiment_of == number
-    measured, predicted = study.measured_um[rows], calibration.fit.predicted_um[rows]
-    quiet(
-        axes, 'across the passes [mm]; dotted: tool path', 'film [µm]',
-        f'{study.campaign.experiments[number].name}: mean {measured.mean():.2f} µm measured, '
-        f'{predicted.mean():.2f} µm predicted; SD of residual '
-        f'{(measured - predicted).std():.2f} µm',
-    )  # fmt: skip
-    middle = panel.passes_m.mean()
-    for line in panel.passes_m - middle:
-        axes.axvline(MM * line, color=MUTED, linewidth=0.8, linestyle=':')
-    across = np.linspace(panel.across_m.min(), panel.across_m.max(), LINE_POINTS)
-    axes.plot(
-        MM * (across - middle), panel.film_um(calibration.model, across), color=ACCENT,
-        linewidth=1.8, label='model',
-    )  # fmt: skip
-    axes.errorbar(
-        MM * (panel.across_m - middle), measured, study.sigma_um[rows],
-        fmt='o', color=INK, markersize=3.5, linewidth=0.8, label='measured',
-    )  # fmt: skip
-    axes.set_ylim(bottom=0.0)
 
 
 def draw_agreement(

@@ -161,15 +161,10 @@ def number(value: float, digits: int = 3) -> str:
         return '0'
     text = f'{value:.{digits}g}'
     if 'e' in text and 1e-4 <= abs(value) < 1e6:
-        return minus(f'{value:.0f}')
+        return f'{value:.0f}'.replace('-', '−')
     mantissa, _, exponent = text.partition('e')
     power = f' × 10{str(int(exponent)).translate(SUPERSCRIPTS)}' if exponent else ''
-    return minus(mantissa) + power
-
-
-def minus(text: str) -> str:
-    """A number with the sign for minus."""
-    return text.replace('-', '−')
+    return mantissa.replace('-', '−') + power
 
 
 def capital(text: str) -> str:
@@ -180,7 +175,7 @@ def capital(text: str) -> str:
 def fixed(value: float, digits: int = 2, signed: bool = False) -> str:
     """With so many decimals; with a sign if wanted, but none where all decimals are zeros."""
     text = f'{value:{"+" if signed else ""}.{digits}f}'
-    return minus(text if float(text) else text.lstrip('+-'))
+    return text.replace('-', '−') if float(text) else text.lstrip('+-')
 
 
 def in_unit(unit: str, *values: float) -> tuple[str, ...]:

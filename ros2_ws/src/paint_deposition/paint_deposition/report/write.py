@@ -123,20 +123,16 @@ def writable(folder: Path) -> Iterator[None]:
         ) from None
 
 
-def input_files(made_from: Mapping[str, Any]) -> dict[str, str]:
-    """Files among what a command says of its inputs, by what they are."""
-    keys = ('mesh_file', 'trajectory', 'model_file', 'zones_file')
-    named = {key.removesuffix('_file'): str(made_from[key]) for key in keys if made_from.get(key)}
-    return {what: file for what, file in named.items() if Path(file).exists()}
-
-
 def with_provenance(
     made_from: Mapping[str, Any],
     model: DepositionModel | Mapping[str, DepositionModel] | None,
     more_files: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
     """The entries with the provenance of their result: the model and the input files."""
-    files = input_files(made_from) | dict(more_files or {})
+    keys = ('mesh_file', 'trajectory', 'model_file', 'zones_file')
+    named = {key.removesuffix('_file'): str(made_from[key]) for key in keys if made_from.get(key)}
+    files = {what: file for what, file in named.items() if Path(file).exists()}
+    files |= dict(more_files or {})
     return {**made_from, 'provenance': origin(model, files)}
 
 

@@ -80,7 +80,7 @@ def _write_comparison(
     result: Comparison | SideBySide, folder: Path, pictures: str = 'png'
 ) -> list[Path]:
     figures = result.to_dict()
-    return _write_results(folder, 'comparison.json', figures, ReportData.of(result), pictures)
+    return _write_results(folder, 'comparison.json', figures, ReportData(result), pictures)
 
 
 @written.register
@@ -92,7 +92,7 @@ def _write_diagnosis(
     for file, steps in zip(models, (result.history[:1], result.history), strict=True):
         known = result.posterior_at(steps[-1]), estimates(steps[-1].fit.marginal)
         write_fitted(file, result.study, steps, *known, start)
-    data = ReportData.of(result, start.history)
+    data = ReportData(result, start.history)
     return models + _write_results(folder, 'diagnosis.json', result.to_dict(), data, pictures)
 
 

@@ -21,7 +21,6 @@ from paint_deposition.files.provenance import (
     MODEL_FILE,
     PLAN_FILE,
     model_digest,
-    origin,
 )
 from paint_deposition.files.rapid.program import module_text
 from paint_deposition.files.recordings.bag_files import TRIGGER
@@ -46,7 +45,7 @@ from paint_deposition.report.plan_pictures import (
     write_uniformity,
 )
 from paint_deposition.report.readings_pictures import write_measuring_picture
-from paint_deposition.report.write import input_files, with_provenance, write_film, written
+from paint_deposition.report.write import with_provenance, write_film, written
 
 BAG, TABLE, PROGRAM, JOINTS = 'trajectory', 'passes.csv', 'passes.mod', 'joints.csv'
 
@@ -162,7 +161,7 @@ def _recommendation(
     pictures: str = 'png',
 ) -> list[Path]:
     files = [folder / 'recommendation.json', folder / f'uniformity.{pictures}']
-    provenance = origin(model, input_files(made_from or {}))
+    provenance = with_provenance(made_from or {}, model)['provenance']
     write_json(files[0], result.to_dict() | {'provenance': provenance})
     write_uniformity(files[1], result)
     return files
@@ -184,7 +183,7 @@ def _passes(
     name = IMPROVEMENT_FILE if isinstance(result, Improvement) else PLAN_FILE
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     files = [folder / one for one in (name, *write_passes(folder, result, part, paint_moves))]
-    given = result.original.notes if isinstance(result, Improvement) else ()
+    given = result.before.trajectory.notes if isinstance(result, Improvement) else ()
     part_facts = {'down': surface.down, 'notes': (*surface.notes, *given)}
     about = with_provenance(part_facts | dict(made_from or {}), result.model)
     write_json(files[0], {**result.to_dict(), DIGEST: model_digest(result.model), **about})

@@ -17,7 +17,7 @@ from scipy.special import chdtrc
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
-from paint_deposition.film.pass_film import collapse_um, sampled_collapse
+from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
@@ -88,19 +88,6 @@ class Panel:
         if len(self.passes_m) > 1:
             return float(np.median(np.diff(np.sort(self.passes_m))))
         return 0.6 * float(np.ptp(self.across_m))
-
-    def film_um(self, model: DepositionModel, across_m: np.ndarray) -> np.ndarray:
-        """Film of the passes on the panel at other places across them (L,) [um].
-
-        Passes count as endless; effects on the finished film are left out.
-        """
-        of_brush, at = model.painting_with(self.brush), (self.distance_m, self.travel_rad)
-        passes = zip(self.passes_m, self.speed_m_per_s, self.mirrored, strict=True)
-        films = [
-            collapse_um(of_brush, across_m - line, speed, *at, turned=mirrored)
-            for line, speed, mirrored in passes
-        ]
-        return np.sum(films, axis=0)
 
     @property
     def places_m(self) -> np.ndarray:
