@@ -111,18 +111,13 @@ def test_ids_are_unique_and_nothing_is_loaded_from_anywhere(report):
     style = re.search(r'<style>(.*?)</style>', report, re.DOTALL).group(1)
     assert 'url(' not in style
     assert '@import' not in style
-    assert len(report) < 4e6
+    assert len(report) < 8e6
 
 
 def test_every_part_and_all_profiles_are_shown_as_pictures(report, diagnosis):
     """Each by itself and as wide as a phone, so that no lettering is larger than another."""
-    images = [a for tag, a in Page(report).elements if tag == 'img']
-    kinds = ('Film on', 'Film along', 'Residual on')
-    pictures = [a['src'] for a in images if a['alt'].startswith(kinds)]
+    pictures = [a['src'] for tag, a in Page(report).elements if tag == 'img']
     profiles = profiles_of(diagnosis.study, [DepositionModel()])
-    assert {'Predicted against measured', 'Residual against a condition'} <= {
-        a['alt'] for a in images
-    }
     assert len(pictures) == 3 * len(diagnosis.study.campaign.experiments) + len(profiles)
     for picture in pictures:
         content = BytesIO(b64decode(picture.removeprefix('data:image/png;base64,')))
@@ -249,13 +244,16 @@ TOO_WIDE = """[...document.querySelectorAll('header *, main *, footer *')].some(
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason='draws the page in Chromium, which is not installed')
-def test_a_browser_shows_every_picture_without_errors(report, comparisons, tmp_path):
+def test_a_browser_draws_every_chart_without_errors(report, comparisons, tmp_path):
     page = tmp_path / 'page.html'
     page.write_text(report.replace('<head>', f'<head>{COMPLAINTS}'))
     with Chromium(tmp_path / 'browser') as browser:
         tab = browser.tab(page.as_uri(), 1400, 1400)
         tab.wait_until('document.documentElement?.dataset.ready !== undefined')
-        assert tab.evaluate('[...document.images].every(one => one.naturalWidth === 570)')
+        charts = "[...document.querySelectorAll('.chart')].map(one => one.dataset.drawn)"
+        drawn = tab.evaluate(charts)
+        assert len(drawn) >= 4
+        assert set(drawn) == {''}
         picture = tmp_path / 'page.png'
         until(lambda: colourful_share(tab.picture(picture)) > 0.02, 'a residual on the part')
         assert tab.evaluate(SORTED_BY_DEVIATION) == sorted(comparisons[-1].points.residual_um)
@@ -265,6 +263,7 @@ def test_a_browser_shows_every_picture_without_errors(report, comparisons, tmp_p
         tab.call('Emulation.setDeviceMetricsOverride', **size)
         tab.wait_until(f'innerWidth === 390 && !{TOO_WIDE}')
         assert tab.evaluate('complaints') == []
+        assert tab.evaluate('document.documentElement.dataset.errors ?? null') is None
 
 
 def colourful_share(picture: Path) -> float:

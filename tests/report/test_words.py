@@ -15,13 +15,8 @@ from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.report import words
-from paint_deposition.report.charts import (
-    footprint_figures,
-    learned_figures,
-    map_figures,
-    radial_figures,
-)
+from paint_deposition.report import charts, words
+from paint_deposition.report.charts import footprint_figure, learned_figure, map_figure
 from paint_deposition.report.data import ReportData
 from small_campaign import small_campaign
 
@@ -98,36 +93,23 @@ def shown(study: Study, *effects) -> ReportData:
     return ReportData(compare(study, DepositionModel(effects=effects)))
 
 
-def ends_of(axes) -> tuple[np.ndarray, np.ndarray]:
-    """The lower and the upper end of the band that is drawn, at its own places."""
-    (band,) = axes.collections
-    corners = band.get_paths()[0].vertices[:-1]
-    half = len(corners) // 2
-    return corners[1:half, 1], corners[half + 1 :, 1][::-1]
-
-
 @pytest.mark.slow
 def test_a_curve_is_drawn_with_its_closed_form_and_with_its_band_if_it_is_known(study):
     law = like('edge_distance_m', 0.0, 0.25, lambda d_m: 0.4 * np.exp(-((d_m / 0.03) ** 2)))
+    plain = learned_figure(shown(study, law))
+    curve = plain['charts'][0]['data'][0]
     known = law.model_copy(update={'sd': (0.02,) * (KNOTS - 1) + (0.5,)})
-    (plain,), (chart,) = (
-        figure.axes for one in (law, known) for figure in learned_figures(shown(study, one))
-    )
-    curve, again, *forms = (plain.lines[0], *chart.lines[:-2])
-    assert again.get_ydata() == pytest.approx(curve.get_ydata())
-    assert ('dots: ' in chart.get_title('left')) == bool(forms)
-    low, high = ends_of(chart)
-    assert high[0] - low[0] == pytest.approx(2.0 * 1.96 * 0.02)
+    figure = learned_figure(shown(study, known))
+    (chart,) = figure['charts']
+    band, again, *forms = chart['data']
+    assert again['y'] == pytest.approx(curve['y'])
+    assert ('dots: ' in chart['title']) == bool(forms)
+    low, high = np.split(band['y'], 2)
+    assert high[-1] - low[0] == pytest.approx(2.0 * 1.96 * 0.02)
     # Far from the edge it is so wide that its lower end would take all film away.
     assert low[-1] == 0.05
-    words = [text.get_text() for text in chart.get_legend().get_texts()]
-    assert sorted(words) == ['95 % band', 'learned']
-    assert [text.get_text() for text in plain.get_legend().get_texts()] == ['learned']
-
-
-def values_of(axes) -> np.ndarray:
-    """(Y, X) what the colours of a heat map stand for."""
-    return np.asarray(axes.images[0].get_array())
+    words = [entry['words'] for entry in figure['legend']]
+    assert words == [*(entry['words'] for entry in plain['legend']), '95 % band']
 
 
 @pytest.mark.slow
@@ -137,50 +119,47 @@ def test_a_map_shows_what_it_does_where_the_readings_of_its_part_lie(study):
     learned = (-2.0, -2.0, -2.0, 0.1, 0.2, 0.3)
     sizes_m = tuple(door.extent_m.tolist()), (9.0, 9.0, 9.0)
     grids = tuple(PartGrid(part_m=size_m, **place) for size_m in sizes_m)
-    assert map_figures(shown(study)) == []
-    maps = map_figures(shown(study, LearnedMap(maps=grids, learned=learned * 2)))
-    first, second = (figure.axes[0] for figure in maps)
-    values = values_of(first)
-    assert values == pytest.approx(np.array([[0.05, 0.05, 0.05], [1.1, 1.2, 1.3]]))
+    assert map_figure(shown(study)) is None
+    maps = map_figure(shown(study, LearnedMap(maps=grids, learned=learned * 2)))
+    [first, dots], [second] = (chart['data'] for chart in maps['charts'])
+    assert first['z'] == pytest.approx(np.array([[0.05, 0.05, 0.05], [1.1, 1.2, 1.3]]))
     # Neutral is the middle of the colours.
-    assert sum(first.images[0].get_clim()) == pytest.approx(2.0)
-    assert values_of(second) == pytest.approx(values)
-    assert len(first.lines[0].get_xdata()) == len(door.positions_m)
-    titles = [axes.get_title('left') for axes in (first, second)]
+    assert first['zmin'] + first['zmax'] == pytest.approx(2.0)
+    assert second['z'] == pytest.approx(first['z'])
+    assert len(dots['x']) == len(door.positions_m)
+    titles = [chart['title'] for chart in maps['charts']]
     assert titles == ['factor on door', 'factor on a part that was not measured here']
-    added = LearnedMap(maps=grids[:1], kind='addition', learned=learned)
-    axes = map_figures(shown(study, added))[0].axes[0]
-    assert values_of(axes) == pytest.approx(np.reshape(learned, (2, 3)))
-    assert sum(axes.images[0].get_clim()) == pytest.approx(0.0)
-    assert axes.get_title('left') == 'addition [µm] on door'
+    added = map_figure(shown(study, LearnedMap(maps=grids[:1], kind='addition', learned=learned)))
+    (chart,) = added['charts']
+    assert chart['data'][0]['z'] == pytest.approx(np.reshape(learned, (2, 3)))
+    assert chart['data'][0]['zmin'] + chart['data'][0]['zmax'] == pytest.approx(0.0)
+    assert chart['title'] == 'addition [µm] on door'
 
 
 @pytest.mark.slow
 def test_a_footprint_is_the_pattern_times_its_factor(study):
     heavier_right = (0.0,) * WAVES + (0.1, 0.2, 0.0, 0.0, 0.0)
     footprint = LearnedFootprint(reach_m=0.2, learned=heavier_right)
-    assert footprint_figures(shown(study)) == []
-    figures = footprint_figures(shown(study, footprint))
-    plain, learned, factor = (values_of(figure.axes[0]) for figure in figures)
-    assert learned == pytest.approx(plain * factor)
-    along = np.linspace(*figures[2].axes[0].get_xlim(), len(factor))
-    x, y = np.meshgrid(along, along)
+    assert footprint_figure(shown(study)) is None
+    charts = footprint_figure(shown(study, footprint))['charts']
+    plain, learned, factor = (chart['data'][0] for chart in charts)
+    assert learned['z'] == pytest.approx(plain['z'] * factor['z'])
+    x, y = np.meshgrid(factor['x'], factor['y'])
     at = np.argmin(np.hypot(x - 0.2, y))
-    assert factor.flat[at] == pytest.approx(1.3, abs=0.03)
-    assert factor[np.hypot(x, y) > 0.41] == pytest.approx(1.0)
+    assert factor['z'].flat[at] == pytest.approx(1.3, abs=0.03)
+    assert factor['z'][np.hypot(x, y) > 0.41] == pytest.approx(1.0)
 
 
 def test_the_footprint_is_shown_with_its_band(study):
     radius_m, eq1 = np.array([0.0, 0.1, 0.2]), np.array([0.5, 1.0, 0.1])
     profile = FootprintProfile(radius_m, eq1, eq1 + 0.1, np.array([0.5, 0.1, 0.01]))
     figures = DiscrepancyFigures(0.02, 0.0, 0.03, 0.1, (0.06, 2.0), profile)
-    assert radial_figures(shown(study)) == []
+    assert charts.profile_figure(shown(study)) is None
     diagnosed = shown(study)
     diagnosed.diagnosis = SimpleNamespace(discrepancy=figures)
-    (axes,) = radial_figures(diagnosed)[0].axes
-    plain, found = (line.get_ydata() for line in axes.lines)
-    assert (plain == eq1).all()
-    assert (found == eq1 + 0.1).all()
-    low, high = ends_of(axes)
-    assert low == pytest.approx(np.maximum(found - 1.96 * profile.sd, 0.0), abs=1e-4)
-    assert high == pytest.approx(found + 1.96 * profile.sd, abs=1e-4)
+    band, plain, found = charts.profile_figure(diagnosed)['charts'][0]['data']
+    assert (plain['y'] == eq1).all()
+    assert (found['y'] == eq1 + 0.1).all()
+    low, high = band['y'][:3], band['y'][:2:-1]
+    assert low == pytest.approx(np.maximum(found['y'] - 1.96 * profile.sd, 0.0), abs=1e-4)
+    assert high == pytest.approx(found['y'] + 1.96 * profile.sd, abs=1e-4)

@@ -1,5 +1,6 @@
 """Pages: the report, and that of `paint demo`, each one HTML file that needs no network."""
 
+import json
 import re
 from base64 import b64encode
 from collections.abc import Callable, Mapping
@@ -14,7 +15,7 @@ from matplotlib.figure import Figure
 from scipy.special import fdtrc
 
 from paint_deposition import __version__, git_version
-from paint_deposition.files.atomic import filled, write_text
+from paint_deposition.files.atomic import filled, plain, write_text
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import CPK_MEANS, film_statistics
 from paint_deposition.inference.comparison.comparison import SideBySide
@@ -23,8 +24,7 @@ from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.planned_film import LaidFilm
-from paint_deposition.report import words
-from paint_deposition.report.charts import page_charts
+from paint_deposition.report import charts, words
 from paint_deposition.report.colour_scales import TWO_SIDED_95, film_scale
 from paint_deposition.report.data import (
     ReportData,
@@ -70,6 +70,14 @@ FILTERS: dict[str, Callable[..., Any]] = {
 
 def report_html(data: ReportData) -> str:
     """The report as one page."""
+    from plotly.offline import get_plotlyjs
+
+    drawn = [
+        charts.parity_figure(data), charts.covariate_figure(data), charts.learned_figure(data),
+        charts.map_figure(data), charts.profile_figure(data), charts.footprint_figure(data),
+    ]  # fmt: skip
+    figures = [figure for figure in drawn if figure]
+    content = json.dumps(plain(figures), separators=(',', ':'), allow_nan=False)
     films, git, diagnosis = film_rows(data), git_version(), data.diagnosis
     profiles, profile_legend = profile_figures(data)
     later = {(m.experiment, m.kind, m.label): m for m in data.comparisons[-1].misfits}
@@ -101,11 +109,13 @@ def report_html(data: ReportData) -> str:
         places=data.proposals[0],
         made=datetime.now().astimezone().strftime('%Y-%m-%d %H:%M %Z'),
         version=f'{__version__} ({git})' if git else __version__,
-        charts={name: list(map(_embedded, of)) for name, of in page_charts(data).items()},
+        figures=[figure['name'] for figure in figures],
+        content=content.replace('<', '\\u003c'),  # it stands inside a script element
         parts=[[*map(_embedded, part_figures(data, k))] for k in range(len(data.experiments))],
         profiles=list(map(_embedded, profiles)),
         profile_legend=profile_legend,
         script=(TEMPLATES / 'report.js').read_text(encoding='utf-8'),
+        plotly=get_plotlyjs(),
     )
 
 
