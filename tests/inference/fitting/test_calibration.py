@@ -12,7 +12,7 @@ from inference.fitting.panels import column, painted_by, panel_of, passes, readi
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.model_file import read_model_file
-from paint_deposition.film.pass_film import sampled_collapse
+from paint_deposition.film.pass_film import collapse_um, sampled_collapse
 from paint_deposition.inference.fitting.calibration import calibrate
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.panel import Panel, fit_collapse, short_reaches
@@ -45,7 +45,11 @@ def test_a_panel_is_seen_as_one_with_its_turned_passes(panel, turned):
     assert seen.distance_m == pytest.approx(0.25, abs=1e-6)
     assert seen.scale_m == pytest.approx(0.577, abs=1e-6)
     assert seen.mirrored.tolist() == [False, turned, False]
-    off_um = seen.film_um(TRUTH, seen.across_m) - part.means.mean_um
+    film_um = sum(
+        collapse_um(TRUTH, seen.across_m - line, speed, seen.distance_m, seen.travel_rad, turned=m)
+        for line, speed, m in zip(seen.passes_m, seen.speed_m_per_s, seen.mirrored, strict=True)
+    )
+    off_um = film_um - part.means.mean_um
     assert np.sqrt(np.mean(off_um**2)) < 0.3
     assert (np.abs(part.means.mean_um - panel.means.mean_um).max() > 1.0) == turned
 

@@ -37,8 +37,9 @@ from paint_deposition.inference.fitting.study import Study
 PRIOR_EFFECT, PRIOR_UNKNOWN = 0.02, 0.02
 # Sizes of the amplitudes, times their typical ones: what is typical is known to within a factor.
 SIZES = np.array([0.5, 1.0, 2.0])
-# An effect acts for certain from this posterior probability of its group on.
-SURE = 0.7
+# An effect acts for certain from this posterior probability of its group on; beside another one,
+# whose law may be off in more ways than the model allows for, from the second.
+SURE, SURE_BESIDE = 0.7, 0.8
 # Between rivals, whose laws are true to their form no better than that, differences of log weight
 # count as so many times smaller (a coarsened posterior, Miller and Dunson 2019).
 COARSENED = 2.0

@@ -29,6 +29,7 @@ from paint_deposition.inference.diagnosis.model_space import (
     CREDIBLE,
     PRIOR_EFFECT,
     SURE,
+    SURE_BESIDE,
     ModelSpace,
     WeightedNull,
     best_amplitude_sizes,
@@ -347,7 +348,8 @@ class Search:
                 others = self.without(trial, better[0])
                 trial = self.with_effect(others, found[better[0]][0][0])
                 continue
-            if not found or min(p for _, p in found.values()) > SURE:
+            sure = SURE_BESIDE if len(found) > 1 else SURE
+            if not found or min(p for _, p in found.values()) > sure:
                 return trial, found
             trial = self.without(trial, min(found, key=lambda name: found[name][1]))
             unknown = self._log_odds(trial, {})[UNKNOWN] > 0.0
