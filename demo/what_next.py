@@ -1,4 +1,4 @@
-"""A diagnosis that leaves two effects open, settled by the spray that it proposes.
+"""A diagnosis that leaves several effects open, settled by the spray that it proposes.
 
 The parts are painted in the virtual paint shop of the tests, which shares no code with the model:
 only it knows what is hidden.

@@ -161,6 +161,9 @@ def test_a_level_that_no_other_part_tells_is_no_error_on_a_part_left_out():
     # What acts with the voltage only is not known without the one part that had it.
     assert study.leaves_out_parts
     assert not study_of(first, off).leaves_out_parts
+    # Nor where all that had it are left out together, as the first and the seventh part are.
+    others = (replace(off, name=str(number)) for number in range(5))
+    assert not study_of(first, *others, second).leaves_out_parts
 
 
 def test_readings_left_out_have_no_part_in_what_is_predicted_and_a_fitted_direction_has():

@@ -157,7 +157,7 @@ def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
 
 
 def _sheets_of_workbook(content: bytes) -> list[Sheet]:
-    """The sheets, unless a stray cell far away, or cells said to repeat, would fill the memory."""
+    """The sheets, unless a stray cell far away would fill the memory."""
     from python_calamine import CalamineError, CalamineWorkbook
 
     cells = 0

@@ -313,10 +313,11 @@ class Study:
     def leaves_out_parts(self) -> bool:
         """Whether whole parts are left out in turn for the error that was not fitted, or patches.
 
-        Parts need another one that was painted with everything switched on: what acts with the
-        voltage only cannot be predicted from parts without it.
+        Each fold needs a part outside it that was painted with everything switched on: what acts
+        with the voltage only cannot be predicted from parts without it.
         """
-        return sum(not e.switched_off for e in self.campaign.experiments) > 1
+        parts = enumerate(self.campaign.experiments)
+        return len({k % FOLDS for k, part in parts if not part.switched_off}) > 1
 
     def folds(self) -> np.ndarray:
         """(P,) number of the fold in which each point is left out, with its part or its patch."""
