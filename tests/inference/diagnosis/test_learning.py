@@ -13,7 +13,7 @@ from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.effects.learned_laws import hat_weights
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.diagnosis import learning
-from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, of_places
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.search import Search, SearchStage
@@ -105,13 +105,36 @@ def test_a_law_that_improves_one_part_only_is_not_chosen_by_that_part():
     films_um[1, study.folds() == 0] += 0.9
 
     class Given(learning.LeftOut):
-        def errors_um(self, without=frozenset(), patches=False, rows=slice(None)):
+        def errors_um(self, without=frozenset(), of='parts', rows=slice(None)):
             return np.sqrt(np.mean((study.measured_um - films_um)[:, rows] ** 2, axis=1))
 
     given, law = Given([SearchStage(nothing, [])], nothing, []), [(WAVY, 1.0)]
     assert given.errors_um()[1] < 0.9
     assert given.borne_out(law) == 1
     assert given.error_um(law) == pytest.approx(np.sqrt((1.0 + 2.0 * 1.02**2) / 3.0))
+
+
+@pytest.mark.slow
+def test_a_map_is_borne_out_by_points_within_a_spot_that_a_patch_takes_out_as_a_whole():
+    (panel,) = gauged(BASE, seed=1, columns=5, orders=THREE[:1]).experiments
+    sound = Study.of(pd.Campaign((panel,)))
+    places_m, patch = sound.campaign.positions_m, sound.patches() == 0
+    middle_m = places_m[patch].mean(axis=0)
+    apart_m = np.linalg.norm(panel.readings.positions_m - middle_m, axis=1)
+    less_um = 10.0 * np.exp(-((apart_m / 0.18) ** 2))
+    spotted = reading(panel, panel.readings.thickness_um - less_um)
+    nothing = Search(begun(pd.Campaign((spotted,)))).nothing
+    study = nothing.state.study
+    left_out = learning.LeftOut(
+        [SearchStage(nothing, [])], nothing, [*of_places(study, nothing.fit.model)]
+    )
+    without, by_patches, _ = left_out.errors_um()
+    assert by_patches == pytest.approx(without, rel=0.02)
+    without, by_points, _ = left_out.errors_um(of='place')
+    assert by_points < 0.75 * without
+    assert left_out.borne_out([(left_out.options[0], 1.0)]) == 1
+    high_m = [np.ptp(places_m[study.scattered() == k, 2]) for k in range(6)]
+    assert min(high_m) > 1.5 > np.ptp(places_m[patch, 2])
 
 
 @pytest.mark.slow

@@ -131,25 +131,30 @@ class LeftOut:
     ) -> None:
         self.stages, self.final, self.options = stages, final, options
         self.study = final.state.study
-        self._known: dict[tuple[frozenset[str], bool], np.ndarray] = {}
+        self.folds = {
+            'parts': self.study.folds(),
+            PLACE: self.study.scattered(),
+            FOOTPRINT: self.study.patches(),
+        }
+        self._known: dict[tuple[frozenset[str], str], np.ndarray] = {}
 
     def errors_um(
         self,
         without: frozenset[str] = frozenset(),
-        patches: bool = False,
+        of: str = 'parts',
         rows: np.ndarray | slice = slice(None),
     ) -> np.ndarray:
         """(n,) with effects and 0 to n - 1 laws, all found without what is left out [um].
 
         Args:
             without: covariates of laws that are not learned.
-            patches: leave out patches of parts, even where there are several parts.
+            of: what is left out, a key of ``folds``.
             rows: of the readings (P,) whose errors count.
         """
-        key = without, patches
+        key = without, of
         if key not in self._known:
             predict = partial(self._predicted, without)
-            self._known[key] = self.study.squares_left_out_um2(predict, patches)
+            self._known[key] = self.study.squares_left_out_um2(predict, self.folds[of])
         return np.sqrt(np.mean(self._known[key][:, rows], axis=1))
 
     def borne_out(
@@ -160,16 +165,17 @@ class LeftOut:
     ) -> int:
         """How many of some laws, from the first one on, the readings left out bear out.
 
-        A curve must predict whole parts better; a map or a footprint these, or patches of the
-        parts without predicting whole parts worse.
+        A curve must predict whole parts better. Without predicting these worse it is enough for a
+        footprint to predict patches better, and for a map, which says what is between readings,
+        single points.
         """
         kept, enough = 0, 1.0 - LEAST_GAIN
         parts_um = self.errors_um(without, rows=rows)
         for count, (law, _) in enumerate(laws, start=1):
             better = parts_um[count] <= enough * parts_um[kept]
             if law.learns in (PLACE, FOOTPRINT) and parts_um[count] <= 1.001 * parts_um[kept]:
-                patches_um = self.errors_um(without, patches=True, rows=rows)
-                better |= patches_um[count] <= enough * patches_um[kept]
+                within_um = self.errors_um(without, law.learns, rows)
+                better |= within_um[count] <= enough * within_um[kept]
             if better:
                 kept = count
         return kept

@@ -243,12 +243,12 @@ class Study:
 
         Args: see ``squares_left_out_um2``.
         """
-        return np.sqrt(np.mean(self.squares_left_out_um2(predict), axis=-1))
+        return np.sqrt(np.mean(self.squares_left_out_um2(predict, self.folds()), axis=-1))
 
     def squares_left_out_um2(
-        self, predict: Callable[[np.ndarray], np.ndarray], patches: bool = False
+        self, predict: Callable[[np.ndarray], np.ndarray], folds: np.ndarray
     ) -> np.ndarray:
-        """(..., P) squared errors at the points of parts that are left out in turn [um2].
+        """(..., P) squared errors at the points of folds that are left out in turn [um2].
 
         Levels of which the other parts say nothing are estimated from the part's own readings, as
         in ``residuals``: see ``levels_untold``.
@@ -256,9 +256,8 @@ class Study:
         Args:
             predict: gives (..., P) films by models that were made without some readings, (P,)
                 bool [um].
-            patches: leave out patches of parts, even where there are several parts.
+            folds: (P,) number of the fold of each point: ``folds``, ``patches`` or ``scattered``.
         """
-        folds = self.patches() if patches else self.folds()
         found = []
         for fold in np.unique(folds):
             out = folds == fold
@@ -332,6 +331,14 @@ class Study:
             count = min(FOLDS, len(np.unique(places, axis=0)))
             patch[part == k] = kmeans2(places / places.std(), count, minit='++', rng=0)[1]
         return patch
+
+    def scattered(self) -> np.ndarray:
+        """(P,) number of a fold of points that lie anywhere among those of their part."""
+        random, part = np.random.default_rng(0), self.campaign.experiment_of
+        fold = np.zeros(len(self), dtype=int)
+        for k in range(len(self.campaign.experiments)):
+            fold[part == k] = random.permutation(np.count_nonzero(part == k)) % FOLDS
+        return fold
 
     def passes(self, model: DepositionModel) -> np.ndarray:
         """(P,) pass, from 0 in each experiment, that left most of the film at each point."""
