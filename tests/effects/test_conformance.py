@@ -23,7 +23,7 @@ WITH_LAW = [e for e in ALL if e.flux_factor is not None or e.pattern_scale is no
 LEARNED_LAWS = [law for law in CURVES.values() if law.flux_factor is not None]
 UNIT_SUFFIXES = {
     'm': '_m', 's': '_s', 'rad': '_rad', 'um': '_um', '1/pass': '_per_pass',
-    '1/(m/s)': '_per_m_per_s', '1': '',
+    '1/(m/s)': '_per_m_per_s', 'm/m': '_m_per_m', '1': '',
 }  # fmt: skip
 # What has a kernel of its own takes seconds to compile.
 COMPILED = [*WITH_LAW, EFFECTS['occlusion']]

@@ -223,6 +223,13 @@ def test_drift_grows_with_the_distance_and_does_not_turn_with_the_gun(standoff_m
     np.testing.assert_allclose(moved, expected, atol=2e-5)
 
 
+@pytest.mark.parametrize(('z_m', 'shift_m'), [(0.1, 0.01), (0.0, 0.02), (-0.1, 0.03), (0.25, 0.0)])
+def test_a_draught_grows_toward_the_floor_and_never_blows_up(z_m, shift_m):
+    drift = EFFECTS['air_drift'](shift_down_m=0.02, gradient_down_m_per_m=0.1)
+    expected = distance_ratio(booth.STANDOFF_M) * np.array([0.0, shift_m])
+    np.testing.assert_allclose(moved_by_m(spot(z_m=z_m), drift), expected, atol=2e-5)
+
+
 @pytest.mark.parametrize('roll_rad', [0.0, 0.5 * np.pi, np.pi])
 def test_an_offset_turns_with_the_gun(roll_rad):
     offset = EFFECTS['tcp_offset'](offset_x_m=0.01, offset_y_m=0.004)
