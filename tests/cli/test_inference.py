@@ -206,6 +206,27 @@ def test_a_slip_among_repeats_is_left_out_and_named(door_alone, tmp_path):
 
 
 @pytest.mark.slow
+def test_the_strongest_misfits_are_printed_and_how_many_more_there_are(door_alone, tmp_path):
+    content = yaml.safe_load(door_alone.read_text())
+    (door,) = content['experiments']
+    for key in ('mesh', 'trajectory', 'measurements'):
+        door[key] = str(door_alone.parent / door[key])
+    content['experiments'] = [door | {'name': f'door {k}'} for k in range(6)]
+    content.pop('model')
+    (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump(content))
+    done = ran('refit', tmp_path / 'campaign.yaml', '--add', 'none', '-o', tmp_path / 'refit')
+    regions = told_in(tmp_path / 'refit' / 'diagnosis.json')['regions']
+    lines = (done.stdout + done.stderr).splitlines()
+    shown = [line for line in lines if line.startswith('misfit before: ')]
+    strongest = [
+        f'misfit before: {one["experiment"]}: {one["description"]}' for one in regions[:5]
+    ]
+    assert shown == strongest
+    assert len(regions) > 5
+    assert f'{len(regions) - 5} weaker misfits before are in diagnosis.json' in lines
+
+
+@pytest.mark.slow
 def test_refit_adds_an_effect_by_its_id_and_carries_the_history_on(door_alone, tmp_path):
     content = figures_of('refit', door_alone, '--add', HIDDEN, '-o', tmp_path, '--json')
     assert content['accepted'] == [HIDDEN]
