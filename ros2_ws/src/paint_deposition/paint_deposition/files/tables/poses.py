@@ -18,7 +18,6 @@ from paint_deposition.files.tables.pose_columns import (
     PoseTable,
     column_name,
     read_rotations,
-    translated,
 )
 from paint_deposition.files.tables.reading_columns import Layout, columns_of
 from paint_deposition.files.tables.sheets import read_sheets
@@ -60,7 +59,7 @@ def holds_readings(path: Path, points_given: bool) -> bool:
         return find_table(path, RecordingError, known, sheets=sheets)[1] is not None
 
     def names(headings: list[Heading]) -> set[str]:
-        return {column_name(heading) for heading in translated(headings)}
+        return {column_name(heading) for heading in headings}
 
     if has(lambda row: {*QUATERNION} <= names(row) or {*SCALAR_FIRST} <= names(row)):
         return False
