@@ -56,6 +56,12 @@ class LearnedLaw(Effect):
         """None: a fit does not vary the law; it is learned by its own step."""
         return {}
 
+    @classmethod
+    def typical(cls) -> 'LearnedLaw':
+        """The law that rises to 0.1 over the second half of its knots."""
+        half = len(cls().learned) // 2
+        return cls(learned=(0.0,) * half + (0.1,) * half)
+
     @property
     def is_neutral(self) -> bool:
         return not any(self.learned)
@@ -174,10 +180,6 @@ class LearnedMap(LearnedLaw):
             )
         return self
 
-    @classmethod
-    def typical(cls) -> 'LearnedMap':
-        return cls(learned=(0.0, 0.1, 0.1, 0.0))
-
     def values_by_part(self) -> Iterator[tuple[PartGrid, np.ndarray]]:
         """Each grid with its values (rows, columns)."""
         first = 0
@@ -258,10 +260,6 @@ class LearnedFootprint(LearnedLaw):
                 f'learned has {len(self.learned)} values; give {WAVES} for each of some radii'
             )
         return self
-
-    @classmethod
-    def typical(cls) -> 'LearnedFootprint':
-        return cls(learned=(0.0,) * WAVES + (0.1,) * WAVES)
 
     def values(self) -> tuple[float, ...]:
         """Steps per metre of the radius, and the values."""
