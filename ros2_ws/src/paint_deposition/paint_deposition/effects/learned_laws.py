@@ -7,8 +7,7 @@ of an embedded discrepancy, inferred inside the model and shown against a physic
 """
 
 from collections.abc import Callable, Iterator
-from functools import cache
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -25,6 +24,8 @@ class LearnedLaw(Effect):
     """Values h at knots over a covariate; the subclass says which and where it acts.
 
     Factor: what arrives is multiplied by 1 + h. Addition: h [um] is added to the film.
+
+    It has no ``parameters``: a fit does not vary the law; it is learned by its own step.
 
     Attributes of a subclass:
         covariate, unit: its name and unit. over: the same in words.
@@ -49,12 +50,6 @@ class LearnedLaw(Effect):
                 f'kind is {self.kind!r}; over {self.covariate} give {" or ".join(self.kinds)}'
             )
         return self
-
-    @classmethod
-    @cache
-    def parameters(cls) -> dict[str, dict[str, Any]]:
-        """None: a fit does not vary the law; it is learned by its own step."""
-        return {}
 
     @classmethod
     def typical(cls) -> 'LearnedLaw':
