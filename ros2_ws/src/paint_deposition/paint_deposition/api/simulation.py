@@ -145,7 +145,7 @@ def simulate(
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface
     point_zones = zones.on(surface) if zones else None
-    common = _painted(surface.points(), seen, surface, 'single', progress)
+    common = _painted(surface.points(), seen, 'single', progress)
     film_um = common.layer_um(laid)
     if film_um.max() < NO_PAINT_UM:
         geometry = seen[0].geometry
@@ -173,7 +173,7 @@ def simulate(
         each = replace(readings, point=np.arange(len(readings)).astype(str))
         each = replace(each, layer=np.array('')) if coats else each
         part = Experiment.of('part', surface, seen[0].path, each)
-        at_points = _painted(part.points, seen, surface, 'double', progress)
+        at_points = _painted(part.points, seen, 'double', progress)
         predicted_um = np.empty(len(part))
         for layer, seeing in laid.by_layer(readings.layer).items():
             layer_um = at_points.layer_um(laid, layer)
@@ -195,7 +195,6 @@ def simulate(
 def _painted(
     points: SurfacePoints,
     seen: Sequence[GunOnPart],
-    surface: Surface,
     precision: Precision,
     progress: Progress,
 ) -> CommonFilm:
@@ -207,7 +206,7 @@ def _painted(
         def report(done: int, before: int = before) -> None:
             progress('painting', (before + done) / steps)
 
-        integrators.append(FilmIntegrator(points, gun.model, precision, surface.occluder))
+        integrators.append(FilmIntegrator(points, gun.model, precision, gun.surface.occluder))
         integrators[-1].add(gun.path, report)
         before += len(gun.path)
     return CommonFilm(tuple(integrators))
