@@ -142,7 +142,6 @@ def shape(name: str, low: str) -> str:
         (with_place('shadow(self)', 'return 2.0'), 'has a shadow of 2; give 0 to 1'),
         (with_place('widening(self)', 'return 0.5'), 'has a widening of 0.5; give 1 to inf'),
         ([('flux_factor', 'pattern_scale')], 'has a pattern_scale and no widening'),
-        (with_place('reach(self)', 'return 2.0'), 'which is called widening now; rename it'),
         ([('high=2.0', "high=float('inf')")], 'loss_per_m_per_s high=inf; give a finite number'),
         ([('0.0, low', 'False, low')], 'loss_per_m_per_s neutral=False; give a number'),
         ([("unit='1/(m/s)'", "unit='1/(m/s)', role='size'")], "the role 'size'; give 'amplitude'"),

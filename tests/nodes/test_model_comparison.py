@@ -10,7 +10,6 @@ from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.inference.comparison.regions import radius_of_readings_m
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.node import OK, WARN
@@ -98,7 +97,8 @@ def test_a_better_model_lowers_the_error(comparison, robot, viewer, call, wait_u
     colours = np.array([[c.r, c.g, c.b] for c in mesh.colors])
     corners = np.array([[p.x, p.y, p.z] for p in mesh.points])
     places = node.readings.positions_m
-    radius_m = radius_of_readings_m(places[::2])
+    apart_m = np.linalg.norm(places[::2, None] - places[::2], axis=2) + np.diag([9.0] * 20)
+    radius_m = np.clip(1.8 * np.median(apart_m.min(axis=1)), 0.025, 0.09)
     distance = np.linalg.norm(corners[:, None] - places, axis=2).min(axis=1)
     grey = np.abs(colours - np.array(BARE_RGB) / 255.0).max(axis=1) < 1e-6
     assert grey[distance > radius_m + 1e-4].all()

@@ -9,7 +9,7 @@ import paint_deposition as pd
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.inference.comparison import regions as areas
 from paint_deposition.inference.comparison.profiles import profiles_of
-from paint_deposition.inference.comparison.regions import interpolation_matrix, reached
+from paint_deposition.inference.comparison.regions import interpolation_matrix
 from paint_deposition.inference.fitting.study import Study
 from small_campaign import small_campaign
 
@@ -80,33 +80,35 @@ def plate():
 
 def test_residuals_spread_evenly_within_the_radius_on_their_side_the_nearer_the_more(plate):
     points = np.array([[0.3, 0, 0.5], [0.6, 0, 0.5]])
-    matrix = interpolation_matrix(plate, points, np.tile([0.0, -1.0, 0.0], (2, 1)), 0.2)
     front = plate.normals[:, 1] < 0
-    distance = np.linalg.norm(plate.vertices_m[:, None] - points, axis=2).min(axis=1)
-    assert np.array_equal(reached(matrix), front & (distance < 0.2))
-    np.testing.assert_allclose((matrix @ [7.0, 7.0])[reached(matrix)], 7.0, rtol=1e-12)
-    near = np.flatnonzero(front)[[40, 41]]
+    for apart_m, radius_m in ((0.3, 0.09), (0.04, 0.072), (0.01, 0.025)):
+        points = np.array([[0.3, 0, 0.5], [0.3 + apart_m, 0, 0.5]])
+        normals = np.tile([0.0, -1.0, 0.0], (2, 1))
+        matrix, reached = interpolation_matrix(plate, points, normals)
+        distance = np.linalg.norm(plate.vertices_m[:, None] - points, axis=2).min(axis=1)
+        assert np.array_equal(reached, front & (distance < radius_m))
+        np.testing.assert_allclose((matrix @ [7.0, 7.0])[reached], 7.0, rtol=1e-12)
+    middle = np.linalg.norm(plate.vertices_m - [0.5, 0.0, 0.5], axis=1)
+    near = np.argsort(np.where(front, middle, 9.0), kind='stable')[:2]
     positions = plate.vertices_m[near]
-    values = interpolation_matrix(plate, positions, plate.normals[near], 0.2) @ [-3.0, 5.0]
-    weight = (1.0 - (np.linalg.norm(positions[0] - positions[1]) / 0.2) ** 2) ** 3
-    assert values[near[0]] == pytest.approx((-3.0 + 5.0 * weight) / (1.0 + weight), abs=1e-12)
-    # The radius is from the spacing unless it is given.
-    points = np.array([[0.3, 0, 0.5], [0.34, 0, 0.5], [0.38, 0, 0.5]])
-    normals = np.tile([0.0, -1.0, 0.0], (3, 1))
-    assert areas.radius_of_readings_m(points) == pytest.approx(0.072)
-    given = interpolation_matrix(plate, points, normals, areas.radius_of_readings_m(points))
-    assert (interpolation_matrix(plate, points, normals) != given).nnz == 0
+    matrix, _ = interpolation_matrix(plate, positions, plate.normals[near])
+    apart_m = np.linalg.norm(positions[0] - positions[1])
+    assert 0.025 < 1.8 * apart_m < 0.09
+    weight = (1.0 - 1.0 / 1.8**2) ** 3
+    expected = (-3.0 + 5.0 * weight) / (1.0 + weight)
+    assert (matrix @ [-3.0, 5.0])[near[0]] == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize(('angle_deg', 'same_side'), [(59.0, True), (61.0, False)])
 def test_surface_turned_by_more_than_60_deg_is_another_side(plate, angle_deg, same_side):
     angle = np.radians(angle_deg)
     normal = np.array([[np.sin(angle), -np.cos(angle), 0.0]])
-    place, value = np.array([[0.5, 0.0, 0.5]]), np.array([2.0])
-    field = areas.interpolate_over_surface(plate, place, normal, value)
+    place = np.array([[0.5, 0.0, 0.5]])
+    matrix, reached = interpolation_matrix(plate, place, normal)
     front = plate.normals[:, 1] < 0
-    assert np.isfinite(field[front]).any() == same_side
-    assert np.isnan(field[~front]).all()
+    assert reached[front].any() == same_side
+    assert not reached[~front].any()
+    np.testing.assert_allclose((matrix @ [2.0])[reached], 2.0, rtol=1e-12)
 
 
 BASE = pd.DepositionModel()

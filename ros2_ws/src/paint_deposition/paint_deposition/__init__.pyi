@@ -29,9 +29,6 @@ from paint_deposition.api.planning import (
     recommend as recommend,
 )
 from paint_deposition.api.simulation import (
-    GunOnPart as GunOnPart,
-)
-from paint_deposition.api.simulation import (
     look_at as look_at,
 )
 from paint_deposition.api.simulation import sample_folder as sample_folder
@@ -50,6 +47,7 @@ from paint_deposition.files.model_file import write_model as write_model
 from paint_deposition.files.motion_files import read_recording as read_recording
 from paint_deposition.files.zones_file import read_zones as read_zones
 from paint_deposition.film.film import Film as Film
+from paint_deposition.film.film import GunOnPart as GunOnPart
 from paint_deposition.inference.comparison.comparison import (
     Comparison as Comparison,
 )

@@ -1,67 +1,29 @@
 """The film that recorded motions leave on a part, how the guns ran over it, and sample files."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError, RecordingError
 from paint_deposition.film.common_film import TOTAL, Coats, CommonFilm, require_same_film_effects
-from paint_deposition.film.film import CoatFilm, Film, GunFilm
+from paint_deposition.film.film import Film, GunOnPart
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision, after_effects
 from paint_deposition.film.live_film import without_refused_states
-from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
+from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.film.statistics import film_statistics, require_band
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.plausibility import readings_in_doubt
 from paint_deposition.inference.readings.readings import Readings
-from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import checked_path
-from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, PoseCounts, Trajectory
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, toward_the_guns
 from paint_deposition.part.zones import Zones
 
 Progress = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class GunOnPart:
-    """A part, its outward side turned to the gun, and the motion of the gun over it.
-
-    Attributes:
-        trajectory: the motion as recorded, with warnings.
-        path: the same cut into sub-steps; counts: its poses.
-        geometry: how the gun ran over the part, and what is odd.
-    """
-
-    surface: Surface
-    trajectory: Trajectory
-    path: SprayPath
-    counts: PoseCounts
-    geometry: SprayGeometry
-
-    def __repr__(self) -> str:
-        return f'GunOnPart({self.geometry.sentence})'
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Remarks on the mesh and the recording for the user."""
-        return (*self.surface.notes, *self.trajectory.notes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Figures by name."""
-        return {
-            'geometry': self.geometry.to_dict(),
-            'frame_id': self.trajectory.frame_id,
-            'down': self.surface.down.tolist(),
-            'area_m2': self.surface.area_m2,
-            'poses': self.counts.to_dict(),
-            'notes': list(self.notes),
-        }
 
 
 def look_at(
@@ -107,7 +69,7 @@ def look_at_guns(
     surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for _, p, _ in paths))
     return [
         GunOnPart(
-            surface, trajectory, path, counts,
+            surface, trajectory, path, counts, model,
             spray_geometry(surface, path, model, trajectory.frame_id),
         )
         for model, (trajectory, path, counts) in zip(models, paths, strict=True)
@@ -183,7 +145,7 @@ def simulate(
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface
     point_zones = zones.on(surface) if zones else None
-    common = _painted(surface.points(), seen, models, surface, 'single', progress)
+    common = _painted(surface.points(), seen, 'single', progress)
     film_um = common.layer_um(laid)
     if film_um.max() < NO_PAINT_UM:
         geometry = seen[0].geometry
@@ -193,14 +155,14 @@ def simulate(
         film_um, surface.vertex_areas_m2, common.used.emitted_cm3,
         target_um=target_um, target_tolerance_um=tolerance_um, zones=point_zones,
     )  # fmt: skip
+    laid_cm3 = common.laid_cm3(surface.vertex_areas_m2).tolist()
     guns = tuple(
-        GunFilm(
-            name, gun.trajectory, gun.path, gun.counts, its_model, gun.geometry,
-            laid_cm3, integrator.used.emitted_cm3,
+        replace(
+            gun, name=name, painted_volume_cm3=painted_cm3,
+            emitted_volume_cm3=integrator.used.emitted_cm3,
         )
-        for name, gun, its_model, laid_cm3, integrator in zip(
-            names or [''], seen, models, common.laid_cm3(surface.vertex_areas_m2).tolist(),
-            common.guns, strict=True,
+        for name, gun, painted_cm3, integrator in zip(
+            names or [''], seen, laid_cm3, common.guns, strict=True
         )
     )  # fmt: skip
     predicted_um = None
@@ -211,7 +173,7 @@ def simulate(
         each = replace(readings, point=np.arange(len(readings)).astype(str))
         each = replace(each, layer=np.array('')) if coats else each
         part = Experiment.of('part', surface, seen[0].path, each)
-        at_points = _painted(part.points, seen, models, surface, 'double', progress)
+        at_points = _painted(part.points, seen, 'double', progress)
         predicted_um = np.empty(len(part))
         for layer, seeing in laid.by_layer(readings.layer).items():
             layer_um = at_points.layer_um(laid, layer)
@@ -223,7 +185,7 @@ def simulate(
         rows = laid.guns(k, k + 1)
         used, coat_um = CommonFilm(common.guns[rows]).used, common.layer_um(laid, name)
         of_coat = film_statistics(coat_um, surface.vertex_areas_m2, used.emitted_cm3)
-        added.append(CoatFilm(name, guns[rows], coat_um, of_coat, used))
+        added.append(Film(surface, guns[rows], coat_um, of_coat, paint=used, name=name))
     return Film(
         surface, guns, film_um, statistics, readings, predicted_um, common.used, doubts,
         tuple(added), point_zones,
@@ -233,20 +195,18 @@ def simulate(
 def _painted(
     points: SurfacePoints,
     seen: Sequence[GunOnPart],
-    models: Sequence[DepositionModel],
-    surface: Surface,
     precision: Precision,
     progress: Progress,
 ) -> CommonFilm:
     """What the guns lay at these points."""
     integrators = []
     before, steps = 0, sum(len(gun.path) for gun in seen)
-    for gun, model in zip(seen, models, strict=True):
+    for gun in seen:
 
         def report(done: int, before: int = before) -> None:
             progress('painting', (before + done) / steps)
 
-        integrators.append(FilmIntegrator(points, model, precision, surface.occluder))
+        integrators.append(FilmIntegrator(points, gun.model, precision, gun.surface.occluder))
         integrators[-1].add(gun.path, report)
         before += len(gun.path)
     return CommonFilm(tuple(integrators))

@@ -100,18 +100,16 @@ def _contents(
     from paint_deposition.files.recordings.messages import STATE_TYPE
     from paint_deposition.files.recordings.pose_topics import sources_of_poses
     from paint_deposition.files.tables.poses import holds_readings, is_pose_table
-    from paint_deposition.files.tables.sheets import is_gauge_file
     from paint_deposition.request import validate
 
     source = validate(MotionSource, 'motion', motion, RecordingError)
     if path.suffix.lower() in SUFFIXES:
         _only('a mesh', 'mesh_scale', 'body')
         return _mesh_contents(path, part)
-    is_table = is_pose_table(path)
-    if is_gauge_file(path) or (is_table and holds_readings(path, points_file is not None)):
+    if holds_readings(path, points_file is not None):
         _only('gauge readings', 'points_file')
         return _readings_contents(path, points_file)
-    if is_table:
+    if is_pose_table(path):
         _only('a table of poses', *MOTION_KINDS, 'max_pose_gap_s')
         poses = read_table(path, source)
         print_all('warning', poses.warnings)

@@ -128,10 +128,11 @@ def _film_lines(film: pd.Film) -> Iterator[str]:
         own = f'{gun.name}: {share:.1f} % of the paint; ' if gun.name else ''
         yield own + gun.geometry.sentence
     for coat in film.coats:
-        wet_film = '' if math.isnan(coat.mean_wet_um) else f', {coat.mean_wet_um:.1f} µm mean wet'
+        wet_um = coat.statistics.mean_um / coat.paint.solids
+        wet_film = '' if math.isnan(wet_um) else f', {wet_um:.1f} µm mean wet'
         yield _film_line(f'coat {coat.name}', coat.statistics) + wet_film
     yield _film_line('film', s)
-    if s.has_target:
+    if not math.isnan(s.within_target):
         band = f'{s.target_um:g} ± {s.target_tolerance_um:g} µm'
         cpk = '' if s.zones else f', Cpk {s.cpk:.2f}'
         yield (

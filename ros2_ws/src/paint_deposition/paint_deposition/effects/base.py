@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -166,9 +166,9 @@ class Effect(BaseModel):
     def parameters(cls) -> dict[str, dict[str, Any]]:
         """Unit, bounds, neutral and typical value and role of each parameter by name."""
         return {
-            name: {**cast(dict, info.json_schema_extra), 'description': info.description}
+            name: {**info.json_schema_extra, 'description': info.description}
             for name, info in cls.model_fields.items()
-            if name not in Effect.model_fields
+            if isinstance(info.json_schema_extra, dict)
         }
 
     @classmethod

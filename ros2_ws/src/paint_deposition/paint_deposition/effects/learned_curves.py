@@ -52,10 +52,6 @@ class LearnedCurve(LearnedLaw):
             raise ValueError(f'sd has {min(self.sd):g}; a standard deviation is 0 or more')
         return self
 
-    @classmethod
-    def typical(cls) -> 'LearnedCurve':
-        return cls(learned=(0.0, 0.1))
-
     def is_off(self, switched_off: frozenset[str]) -> bool:
         return self.acts_with in switched_off
 

@@ -7,8 +7,7 @@ of an embedded discrepancy, inferred inside the model and shown against a physic
 """
 
 from collections.abc import Callable, Iterator
-from functools import cache
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -25,6 +24,8 @@ class LearnedLaw(Effect):
     """Values h at knots over a covariate; the subclass says which and where it acts.
 
     Factor: what arrives is multiplied by 1 + h. Addition: h [um] is added to the film.
+
+    It has no ``parameters``: a fit does not vary the law; it is learned by its own step.
 
     Attributes of a subclass:
         covariate, unit: its name and unit. over: the same in words.
@@ -51,10 +52,10 @@ class LearnedLaw(Effect):
         return self
 
     @classmethod
-    @cache
-    def parameters(cls) -> dict[str, dict[str, Any]]:
-        """None: a fit does not vary the law; it is learned by its own step."""
-        return {}
+    def typical(cls) -> 'LearnedLaw':
+        """The law that rises to 0.1 over the second half of its knots."""
+        half = len(cls().learned) // 2
+        return cls(learned=(0.0,) * half + (0.1,) * half)
 
     @property
     def is_neutral(self) -> bool:
@@ -174,10 +175,6 @@ class LearnedMap(LearnedLaw):
             )
         return self
 
-    @classmethod
-    def typical(cls) -> 'LearnedMap':
-        return cls(learned=(0.0, 0.1, 0.1, 0.0))
-
     def values_by_part(self) -> Iterator[tuple[PartGrid, np.ndarray]]:
         """Each grid with its values (rows, columns)."""
         first = 0
@@ -258,10 +255,6 @@ class LearnedFootprint(LearnedLaw):
                 f'learned has {len(self.learned)} values; give {WAVES} for each of some radii'
             )
         return self
-
-    @classmethod
-    def typical(cls) -> 'LearnedFootprint':
-        return cls(learned=(0.0,) * WAVES + (0.1,) * WAVES)
 
     def values(self) -> tuple[float, ...]:
         """Steps per metre of the radius, and the values."""

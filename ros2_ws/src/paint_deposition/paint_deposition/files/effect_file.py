@@ -178,8 +178,6 @@ def problem_in_words(effect: type[Effect]) -> str | None:
             return problem
     if not effect.amplitudes():
         return 'has no amplitude; declare one with parameter(0.0, low=..., high=..., typical=...)'
-    if hasattr(effect, 'reach'):
-        return 'defines reach, which is called widening now; rename it'
     if all(getattr(effect, place) is getattr(Effect, place) for place in PLACES):
         return f'does nothing; define one of {", ".join(PLACES)}'
     if effect.acts('pattern_scale') and not effect.acts('widening'):
@@ -321,19 +319,27 @@ def _problem_with_places(effect: Effect, changes: bool = True) -> str | None:
             if 'read-only' in str(error):
                 return f'has an {place} that changes what it is given; return a new array instead'
             return f'has an {place} that fails ({type(error).__name__}: {one_line(error)})'
-        problem = (_problem_with_path if place == 'on_path' else _problem_with_film)(result, given)
-        if problem:
+        if problem := _problem_with_result(result, given):
             return f'has an {place} that {problem}'
         if not changes and not _same(result, given):
             return f'has an {place} that changes something at the neutral values; it must not'
     return None
 
 
-def _problem_with_path(result: Any, path: SprayPath) -> str | None:
+def _problem_with_result(result: Any, given: SprayPath | np.ndarray) -> str | None:
+    """What is wrong with what became of a path, or of a film."""
+    if isinstance(given, np.ndarray):
+        sound = isinstance(result, np.ndarray) and result.shape == given.shape
+        if sound and result.dtype.kind in 'fiu' and np.isfinite(result).all():
+            return None
+        return (
+            'does not return a finite film; return an array with one finite number a point, also '
+            'on bare metal and where edge_distance_m is inf'
+        )
     if not isinstance(result, SprayPath):
         return 'does not return a path; return path.with_(...)'
-    for name in (column.name for column in fields(path)):
-        value, wanted = getattr(result, name), getattr(path, name).shape
+    for name in (column.name for column in fields(given)):
+        value, wanted = getattr(result, name), getattr(given, name).shape
         if not isinstance(value, np.ndarray) or value.shape != wanted:
             return f'gives {name} the shape {np.shape(value)}; give an array {wanted}'
         if name in FINITE and not np.isfinite(value).all():
@@ -341,16 +347,6 @@ def _problem_with_path(result: Any, path: SprayPath) -> str | None:
         if name in ('flow', 'dwell_s') and value.min() < 0.0:
             return f'gives {name} of {value.min():g}; give 0 or more'
     return None
-
-
-def _problem_with_film(result: Any, film_um: np.ndarray) -> str | None:
-    sound = isinstance(result, np.ndarray) and result.shape == film_um.shape
-    if sound and result.dtype.kind in 'fiu' and np.isfinite(result).all():
-        return None
-    return (
-        'does not return a finite film; return an array with one finite number a point, also on '
-        'bare metal and where edge_distance_m is inf'
-    )
 
 
 def _same(result: Any, given: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -27,54 +28,47 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class GunFilm:
-    """What one of the guns on a part did."""
+class GunOnPart:
+    """A part, its outward side turned to the gun, and the motion of the gun over it.
 
-    name: str  # of the gun, '' for the only one
-    trajectory: Trajectory  # its motion as recorded
-    path: SprayPath  # the same cut into sub-steps
-    counts: PoseCounts  # its poses
-    model: DepositionModel  # its deposition model
-    geometry: SprayGeometry  # how it ran over the part
-    painted_volume_cm3: float  # solids that it laid on the part, before effects on the film [cm3]
-    emitted_volume_cm3: float  # solids that a part which catches everything would get of it [cm3]
+    Attributes:
+        trajectory: the motion as recorded, with warnings.
+        path: the same cut into sub-steps; counts: its poses.
+        model: what it sprays.
+        geometry: how the gun ran over the part, and what is odd.
+        name: of the gun, '' for the only one.
+        painted_volume_cm3: solids that it laid on the part, before effects on the film, and
+        emitted_volume_cm3: those that a part which catches everything would get of it [cm3]; NaN
+            where nothing was painted.
+    """
 
-    def to_dict(self) -> dict[str, Any]:
-        """Figures by name."""
-        return {
-            'name': self.name,
-            'trajectory': self.trajectory.source,
-            'effects': [effect.id for effect in self.model.effects],
-            'spraying_time_s': self.path.spraying_time_s,
-            'painted_volume_cm3': self.painted_volume_cm3,
-            'emitted_volume_cm3': self.emitted_volume_cm3,
-            'poses': self.counts.to_dict(),
-            'geometry': self.geometry.to_dict(),
-        }
+    surface: Surface
+    trajectory: Trajectory
+    path: SprayPath
+    counts: PoseCounts
+    model: DepositionModel
+    geometry: SprayGeometry
+    name: str = ''
+    painted_volume_cm3: float = math.nan
+    emitted_volume_cm3: float = math.nan
 
-
-@dataclass(frozen=True)
-class CoatFilm:
-    """What one of the coats adds to the film on a part."""
-
-    name: str
-    guns: tuple[GunFilm, ...]  # what laid it
-    film_um: np.ndarray  # (V,) film at the vertices of the surface [um]
-    statistics: FilmStatistics  # of this film
-    paint: PaintUsed  # that was sprayed
+    def __repr__(self) -> str:
+        return f'GunOnPart({self.geometry.sentence})'
 
     @property
-    def mean_wet_um(self) -> float:
-        """Mean film before anything evaporates [um]; NaN where its solids are not known."""
-        return self.statistics.mean_um / self.paint.solids
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on the mesh and the recording for the user."""
+        return (*self.surface.notes, *self.trajectory.notes)
 
     def to_dict(self) -> dict[str, Any]:
         """Figures by name."""
         return {
-            'name': self.name,
-            'atomizers': [gun.name for gun in self.guns],
-            **self.statistics.to_dict(),
-            'paint': paint_figures(self.guns[0].model, self.paint, self.statistics),
+            'geometry': self.geometry.to_dict(),
+            'frame_id': self.trajectory.frame_id,
+            'down': self.surface.down.tolist(),
+            'area_m2': self.surface.area_m2,
+            'poses': self.counts.to_dict(),
+            'notes': list(self.notes),
         }
 
 
@@ -91,20 +85,22 @@ class Film(Tabular):
         predicted_um: (N,) what the gauge should show at each of them [um], or None.
         paint: that was sprayed.
         doubts: what is odd in the readings.
-        coats: in the order of painting, where the film was laid in named coats.
+        coats: what each adds, in the order of painting, where the film was laid in named coats.
         zones: of the vertices, each with a target, or None.
+        name: of the coat whose film it is, '' for that of all of them.
     """
 
     surface: Surface
-    guns: tuple[GunFilm, ...]
+    guns: tuple[GunOnPart, ...]
     film_um: np.ndarray
     statistics: FilmStatistics
     readings: Readings | None = None
     predicted_um: np.ndarray | None = None
     paint: PaintUsed = field(default_factory=PaintUsed)
     doubts: tuple[str, ...] = ()
-    coats: tuple[CoatFilm, ...] = ()
+    coats: tuple[Film, ...] = ()
     zones: PointZones | None = None
+    name: str = ''
 
     def __repr__(self) -> str:
         s = self.statistics
@@ -169,7 +165,7 @@ class Film(Tabular):
             )
         return (*recorded, *odd, *brushes, *negative, *self.doubts)
 
-    def _of_each(self, lines: Callable[[GunFilm], tuple[str, ...]]) -> tuple[str, ...]:
+    def _of_each(self, lines: Callable[[GunOnPart], tuple[str, ...]]) -> tuple[str, ...]:
         return tuple(
             f'{gun.name}: {line}' if gun.name else line for gun in self.guns for line in lines(gun)
         )
@@ -179,8 +175,16 @@ class Film(Tabular):
 
         The geometry is that of the first gun; `atomizers` has each.
         """
-        coats = {'coats': [coat.to_dict() for coat in self.coats]} if self.coats else {}
-        return self.statistics.to_dict() | coats | {
+        coats = [
+            {
+                'name': coat.name,
+                'atomizers': [gun.name for gun in coat.guns],
+                **coat.statistics.to_dict(),
+                'paint': paint_figures(coat.model, coat.paint, coat.statistics),
+            }
+            for coat in self.coats
+        ]
+        return self.statistics.to_dict() | ({'coats': coats} if coats else {}) | {
             'frame_id': self.trajectory.frame_id,
             'down': self.surface.down.tolist(),
             'effects': list(dict.fromkeys(e.id for gun in self.guns for e in gun.model.effects)),
@@ -188,7 +192,19 @@ class Film(Tabular):
             'paint': paint_figures(self.model, self.paint, self.statistics),
             'poses': self.counts.to_dict(),
             'geometry': self.guns[0].geometry.to_dict(),
-            'atomizers': [gun.to_dict() for gun in self.guns],
+            'atomizers': [
+                {
+                    'name': gun.name,
+                    'trajectory': gun.trajectory.source,
+                    'effects': [effect.id for effect in gun.model.effects],
+                    'spraying_time_s': gun.path.spraying_time_s,
+                    'painted_volume_cm3': gun.painted_volume_cm3,
+                    'emitted_volume_cm3': gun.emitted_volume_cm3,
+                    'poses': gun.counts.to_dict(),
+                    'geometry': gun.geometry.to_dict(),
+                }
+                for gun in self.guns
+            ],
             'notes': list(self.notes),
             'warnings': list(self.warnings),
         }  # fmt: skip

@@ -90,12 +90,6 @@ class GunView:
         each = [spraying.select(spraying.spray_pass == n) for n in np.unique(spraying.spray_pass)]
         return [one for one in each if one.dwell_s @ one.speed_m_per_s >= 0.05]
 
-    @cached_property
-    def landing_of_passes(self) -> list[float]:
-        """Share of the rays of each pass that land on the part; 1 where it is too short."""
-        number, seen = self.path.spray_pass, [one.spray_pass[0] for one in self.passes]
-        return [float(self.landing[number == n].mean()) if n in number else 1.0 for n in seen]
-
 
 def pattern_rays(planar: PlanarPattern) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(R,) places x, y on the model plane [m] that share out eq. (1), and their weights.
@@ -125,8 +119,9 @@ def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
         yield alone
         return
     aim = _wrong_axis(view, boxes) or _off_model_plane(view, boxes)
-    shares = view.landing_of_passes
-    hits = [share >= LEAST_LANDING for share in shares]
+    # Whether so much of each pass lands on the part; of one that is too short it is not known.
+    passes = [view.path.spray_pass == one.spray_pass[0] for one in view.passes]
+    hits = [not at.any() or float(view.landing[at].mean()) >= LEAST_LANDING for at in passes]
     hitting = [*compress(view.passes, hits)]
     aside = hitting and _aside(view, hitting) and _aside(view, view.passes)
     if aim:
@@ -136,9 +131,9 @@ def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
     if aim or aside or all(hits):
         return
     missing = [str(number) for number, hit in enumerate(hits, start=1) if not hit]
-    which = f'pass {missing[0]} of {len(shares)} misses'
+    which = f'pass {missing[0]} of {len(hits)} misses'
     if len(missing) > 1:
-        which = f'passes {", ".join(missing[:-1])} and {missing[-1]} of {len(shares)} miss'
+        which = f'passes {", ".join(missing[:-1])} and {missing[-1]} of {len(hits)} miss'
     cause = "check the trigger, the part's pose and that the mesh is the whole part"
     if np.all(view.whole.flow > 0.0):
         cause = (

@@ -65,11 +65,6 @@ class FilmStatistics:
     zones: Mapping[str, FilmStatistics] = field(default_factory=dict)  # each by its name
 
     @property
-    def has_target(self) -> bool:
-        """Whether there is a band to be in."""
-        return not math.isnan(self.within_target)
-
-    @property
     def band_um(self) -> tuple[float, float]:
         """Lowest and highest film of the target band [um]."""
         off = self.target_tolerance_um
@@ -220,17 +215,16 @@ class PaintUsed:
         """Share of solids in the volume of the film while it is wet."""
         return self.emitted_cm3 / self.emitted_wet_cm3 if self.emitted_wet_cm3 else math.nan
 
-    def transfer_efficiency(self, on_part_cm3: float) -> float:
-        """Solids on the part [cm3] over solids sprayed."""
-        return on_part_cm3 / self.solids_cm3 if self.solids_cm3 else math.nan
-
     def figures(self, mean_um: float, on_part_cm3: float) -> dict[str, Any]:
-        """By name, for a mean dry film [um] and the solids on the part; None is not known."""
+        """By name, for a mean dry film [um] and the solids on the part; None is not known.
+
+        The transfer efficiency is solids on the part over solids sprayed.
+        """
         known = {
             'wet_cm3': self.wet_cm3,
             'mass_g': self.mass_g,
             'solids_cm3': self.solids_cm3,
-            'transfer_efficiency': self.transfer_efficiency(on_part_cm3),
+            'transfer_efficiency': on_part_cm3 / self.solids_cm3 if self.solids_cm3 else math.nan,
             'mean_wet_film_um': mean_um / self.solids if self.solids else math.nan,
         }
         return {k: None if math.isnan(v) else v for k, v in known.items()} | {
@@ -247,15 +241,14 @@ def paint_figures(
 
 def paint_sentence(paint: PaintUsed, film: FilmStatistics) -> str:
     """The paint used in a line, '' where nothing of it is known."""
-    said = []
-    if not math.isnan(paint.wet_cm3):
-        mass = '' if math.isnan(paint.mass_g) else f' ({paint.mass_g:.1f} g)'
-        said.append(f'{paint.wet_cm3:.1f} cm3{mass} of paint sprayed')
-    share = paint.transfer_efficiency(film.painted_volume_cm3)
-    if not math.isnan(share):
-        said.append(f'transfer efficiency {100 * share:.0f} %')
-    if not math.isnan(paint.solids):
-        said.append(f'mean wet film {film.mean_um / paint.solids:.1f} µm')
+    said, known = [], paint.figures(film.mean_um, film.painted_volume_cm3)
+    if known['wet_cm3'] is not None:
+        mass = '' if known['mass_g'] is None else f' ({known["mass_g"]:.1f} g)'
+        said.append(f'{known["wet_cm3"]:.1f} cm3{mass} of paint sprayed')
+    if known['transfer_efficiency'] is not None:
+        said.append(f'transfer efficiency {100 * known["transfer_efficiency"]:.0f} %')
+    if known['mean_wet_film_um'] is not None:
+        said.append(f'mean wet film {known["mean_wet_film_um"]:.1f} µm')
     return ', '.join(said)
 
 

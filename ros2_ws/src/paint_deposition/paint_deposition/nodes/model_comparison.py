@@ -12,7 +12,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
-from paint_deposition.inference.comparison.regions import interpolation_matrix, reached
+from paint_deposition.inference.comparison.regions import interpolation_matrix
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.gauge_noise import gauge_noise
 from paint_deposition.inference.readings.plausibility import readings_in_doubt, zeros_in_doubt
@@ -102,8 +102,7 @@ class ModelComparison(PaintingNode):
         self._mesh = coloured_mesh(surface.vertices_m, surface.faces, frame_id, 'residual')
         at = slice(len(self._experiment))
         places, normals = self.points.positions_m[at], self.points.normals[at]
-        self._spreading = interpolation_matrix(surface, places, normals)
-        self._coloured = reached(self._spreading)
+        self._spreading, self._coloured = interpolation_matrix(surface, places, normals)
 
     def residuals(self) -> Residuals:
         """The residuals of all readings, with the film of all poses received."""

@@ -1,5 +1,6 @@
 """The painted part with the gun's way over it, the target band, and the figures of its film."""
 
+import math
 from textwrap import fill
 
 import numpy as np
@@ -55,7 +56,7 @@ def film_picture(
     # The part's share of the picture, the column beside it, and the room around both [in].
     width, height = (high - low) * min(7.6 / (high - low))
     beside, around = 3.1, 1.0
-    rows = 2 if statistics.has_target else 1
+    rows = 1 if math.isnan(statistics.within_target) else 2
     figure = new_figure(width + beside + around, rows * (max(height, 3.4) + around))
     grid = figure.add_gridspec(rows, 2, width_ratios=[width, beside])
     axes = [figure.add_subplot(grid[row, 0]) for row in range(rows)]

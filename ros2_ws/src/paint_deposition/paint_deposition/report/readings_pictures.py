@@ -12,7 +12,7 @@ from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.comparison.profiles import Profile
-from paint_deposition.inference.comparison.regions import interpolate_over_surface
+from paint_deposition.inference.comparison.regions import interpolation_matrix
 from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.panel import PanelFit
@@ -84,9 +84,10 @@ def residual_figures(data: ReportData, index: int, part: PartPicture) -> list[Fi
     largest = float(np.quantile(np.abs(np.concatenate(data.residuals_um)), 0.98))
     scale = residual_scale(largest)
     places = part.view.flat(positions)
+    spreading, coloured = interpolation_matrix(surface, positions, normals)
     figures = []
     for name, residual_um in zip(data.model_names, data.residuals_um, strict=True):
-        field = interpolate_over_surface(surface, positions, normals, residual_um[rows])
+        field = np.where(coloured, spreading @ residual_um[rows], np.nan)
         figure, axes = part.on_page(*part.window(), f'residual, {name}')
         part.draw(axes, scale.rgba(np.clip(field, -largest, largest), np.isfinite(field)))
         shown_um = np.clip(residual_um[rows], -largest, largest)

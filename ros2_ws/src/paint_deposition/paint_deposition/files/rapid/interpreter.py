@@ -1,7 +1,6 @@
 """Running a RAPID program: its control flow and the calls of its routines."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from itertools import count
 from typing import Any
@@ -33,7 +32,7 @@ class _Return(Exception):
     """The end of a routine, with its value."""
 
 
-class _Exit(Exception):
+class Exit(Exception):
     """The end of the program."""
 
 
@@ -44,19 +43,9 @@ class Interpreter(Values):
     # anything; the same without doing it.
     act: Callable[[Instruction], bool]
     acts: Callable[[Instruction], bool]
+    passed: dict[str, dict[int, None]]  # what was passed over, with its lines
     _running: tuple[Routine, ...] = ()
     _count = 0.0
-
-    def run(self, start: Routine) -> str:
-        """Run a program from the start of a procedure on; what was passed over, with its lines."""
-        self._passed: dict[str, dict[int, None]] = {}
-        with suppress(_Exit):
-            self.call(start, [], {})
-        passed = []
-        for name, lines in self._passed.items():
-            shown = ', '.join(map(str, [*lines][:5])) + (' ...' if len(lines) > 5 else '')
-            passed.append(f'{name} (line{"s" * (len(lines) > 1)} {shown})')
-        return ', '.join(passed)
 
     def call(self, routine: Routine, values: list, options: dict[str, Any]) -> Any:
         if any(routine is one for one in self._running):
@@ -135,7 +124,7 @@ class Interpreter(Values):
         elif i.name == 'return':
             raise _Return(self.value(i.values[0]) if i.values else None)
         elif i.name == 'exit':
-            raise _Exit
+            raise Exit
         elif i.name in CHANGING:
             needed = 2 if CHANGING[i.name] is None else 1
             if len(i.values) != needed:
@@ -157,7 +146,7 @@ class Interpreter(Values):
                 self.assign(i.values[0], Unknown(i.name, f'what {i.name} reads in line {i.line}'))
             output = i.values[0] if i.name.startswith(('set', 'reset')) and i.values else None
             names = output.children[:1] if isinstance(output, Node) else []
-            self._passed.setdefault(' '.join([i.name, *map(str, names)]), {})[i.line] = None
+            self.passed.setdefault(' '.join([i.name, *map(str, names)]), {})[i.line] = None
 
     def _assignment(self, reference: Node, node: Any) -> None:
         self.line = reference.children[0].line
@@ -249,7 +238,7 @@ class Interpreter(Values):
                 name = reference.children[0]
                 unknown = Unknown(name, f'{name}, which depends on {reason}')
                 self.assign(Node('reference', [name]), unknown)
-        self._passed.setdefault(str(word), {})[line_of(word)] = None
+        self.passed.setdefault(str(word), {})[line_of(word)] = None
 
 
 def _assigned(node: Node) -> Iterator[Node]:

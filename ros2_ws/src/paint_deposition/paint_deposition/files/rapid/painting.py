@@ -1,12 +1,13 @@
 """What a RAPID program does to the robot and the gun: its moves of the TCP."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from paint_deposition.errors import quoted
 from paint_deposition.files.rapid.gun import Gun, RapidMove, name_of
-from paint_deposition.files.rapid.interpreter import PASSED_OVER
+from paint_deposition.files.rapid.interpreter import PASSED_OVER, Exit
 from paint_deposition.files.rapid.parser import Instruction, Module, Routine
 from paint_deposition.files.rapid.values import (
     NOWHERE,
@@ -41,9 +42,12 @@ class Painting(Gun):
         self._displacement = HOME
         self._speed_share, self._fastest_mm_per_s = 1.0, np.inf
         self._external_line = 0
+        self.passed = {}
 
-    def run(self, start: Routine) -> str:
-        passed_over = super().run(start)
+    def run(self, start: Routine) -> None:
+        """Run the program from the start of a procedure on."""
+        with suppress(Exit):
+            self.call(start, [], {})
         if self.planes:
             *_, self.line = self.planes[0]
             self.fail('the TCP never passes this plane while it paints; check its value')
@@ -53,9 +57,12 @@ class Painting(Gun):
                 'an external axis moves, and the work objects stand still; give the work object '
                 'its mechanical unit (ufmec), or take this out'
             )
-        if passed_over:
-            self.program.note(f'passed over, neither motion nor paint: {passed_over}')
-        return passed_over
+        passed = []
+        for name, lines in self.passed.items():
+            shown = ', '.join(map(str, [*lines][:5])) + (' ...' if len(lines) > 5 else '')
+            passed.append(f'{name} (line{"s" * (len(lines) > 1)} {shown})')
+        if passed:
+            self.program.note(f'passed over, neither motion nor paint: {", ".join(passed)}')
 
     def acts(self, i: Instruction) -> bool:
         if i.name.startswith('wait'):

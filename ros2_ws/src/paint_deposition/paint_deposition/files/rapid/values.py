@@ -66,7 +66,7 @@ def frame(pose: Any) -> Frame:
     norm = math.hypot(*quaternion)
     if abs(norm - 1.0) > QUATERNION_TOLERANCE:
         raise ValueError(f'quaternion {quaternion} has the norm {norm:.4f} instead of 1')
-    return np.array(position), Rotation.from_quat([*quaternion[1:], quaternion[0]])
+    return np.array(position), Rotation.from_quat(quaternion, scalar_first=True)
 
 
 def product(first: Frame, second: Frame) -> Frame:
@@ -87,11 +87,6 @@ def _are_numbers(value: object, count: int) -> bool:
     return isinstance(value, list) and len(value) == count and all(map(is_number, value))
 
 
-def _wxyz(rotation: Rotation) -> list[float]:
-    x, y, z, w = rotation.as_quat().tolist()
-    return [w, x, y, z]
-
-
 def _offs(target: list, *step: float, axes: Rotation | None = None) -> list:
     position, _ = frame(target)
     if not _are_numbers([*step], 3):
@@ -106,13 +101,14 @@ def _rel_tool(target: list, *step: float, **turn: float) -> list:
         raise ValueError(f'options {" ".join(turn)}')
     position, *rest = _offs(target, *step, axes=rotation)
     if any(angles):
-        rest[0] = _wxyz(rotation * Rotation.from_euler('XYZ', angles, degrees=True))
+        turned = rotation * Rotation.from_euler('XYZ', angles, degrees=True)
+        rest[0] = turned.as_quat(scalar_first=True).tolist()
     return [position, *rest]
 
 
 def _pose_mult(first: list, second: list) -> list:
     position, rotation = product(frame(first), frame(second))
-    return [position.tolist(), _wxyz(rotation)]
+    return [position.tolist(), rotation.as_quat(scalar_first=True).tolist()]
 
 
 def _of_vectors(calculate: Callable) -> Callable:
@@ -145,7 +141,9 @@ FUNCTIONS: dict[str, Callable] = {
     'atan2': lambda y, x: math.degrees(math.atan2(y, x)),
     'dim': lambda array, axis: float(np.shape(array)[int(axis) - 1]),
     'offs': _offs, 'reltool': _rel_tool, 'posemult': _pose_mult, 'distance': math.dist,
-    'orientzyx': lambda *zyx: _wxyz(Rotation.from_euler('ZYX', zyx, degrees=True)),
+    'orientzyx': lambda *zyx: (
+        Rotation.from_euler('ZYX', zyx, degrees=True).as_quat(scalar_first=True).tolist()
+    ),
 }  # fmt: skip
 
 

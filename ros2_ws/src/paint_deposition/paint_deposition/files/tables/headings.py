@@ -55,6 +55,13 @@ BESIDE = {
     'pos', 'position', 'coordinate', 'coordinates', 'koordinate', 'koordinaten', 'lage', 'act',
     'actual', 'ist', 'measured', 'gemessen',
 }  # fmt: skip
+# The columns of the log of abb_libegm that hold what the robot measured, as usual headings.
+EGM_LOG = {
+    'TIMESTAMP': 'time [ms]',
+    **{f'R_FB_POS_{axis}': f'{axis} [mm]' for axis in 'XYZ'},
+    **{f'R_FB_QUAT_U{k}': f'q{k + 1}' for k in range(4)},
+    **{f'R_FB_POS_RJ{k}': f'J{k} [deg]' for k in range(1, 7)},
+}
 BRACKETED = re.compile(r'[\[(]\s*([^\])]*?)\s*[\])]')
 
 
@@ -189,7 +196,15 @@ def widest(sheet: Sheet) -> list[Cell]:
 
 
 def headings_in(row: list[Cell]) -> list[Heading]:
-    """The cells of a row as headings."""
+    """The cells of a row as headings.
+
+    Those of a log of abb_libegm have the usual words and units; what it planned (R_PL) and was
+    asked for (S_REF) has no words.
+    """
+    if not {'R_FB_POS_X', 'R_FB_POS_RJ1'}.isdisjoint(row):
+        return [
+            replace(Heading.of(EGM_LOG.get(text, '')), text=text) for text in map(text_of, row)
+        ]
     return [Heading('#', ('#',)) if cell == '#' else Heading.of(text_of(cell)) for cell in row]
 
 

@@ -1,7 +1,7 @@
 """The columns of a table of poses, known by their names."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from functools import partial
 from pathlib import Path
@@ -36,13 +36,6 @@ ROTATED = {
     **dict.fromkeys(('rot', 'rotation', 'rotvec', 'rv', 'r'), 'r'),
     **dict.fromkeys(('euler', 'angle', 'e'), 'e'),
 }
-# The columns of the log of abb_libegm that hold what the robot measured, as usual headings.
-EGM_LOG = {
-    'TIMESTAMP': 'time [ms]',
-    **{f'R_FB_POS_{axis}': f'{axis} [mm]' for axis in 'XYZ'},
-    **{f'R_FB_QUAT_U{k}': f'q{k + 1}' for k in range(4)},
-    **{f'R_FB_POS_RJ{k}': f'J{k} [deg]' for k in range(1, 7)},
-}
 
 
 @dataclass
@@ -68,7 +61,7 @@ class PoseTable(Table):
                 f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first}); '
                 'joints are read with --urdf'
             )
-        headings = translated(headings_in(sheet.rows[header]))
+        headings = headings_in(sheet.rows[header])
         names = [column_name(heading) for heading in headings]
         headings, below = rows_below(sheet, headings, header + 1)
         table = PoseTable(
@@ -160,24 +153,12 @@ def column_name(heading: Heading) -> str:
     return kept[-1] if kept[-1] in known else ''.join(kept)
 
 
-def translated(headings: list[Heading]) -> list[Heading]:
-    """The headings of a log of abb_libegm with the usual words and units, others as they are.
-
-    What it planned (R_PL) and was asked for (S_REF) has no words.
-    """
-    if {'R_FB_POS_X', 'R_FB_POS_RJ1'}.isdisjoint(heading.text for heading in headings):
-        return headings
-    usual = [Heading.of(EGM_LOG.get(heading.text, '')) for heading in headings]
-    return [replace(its, text=heading.text) for its, heading in zip(usual, headings, strict=True)]
-
-
 def _by_text(headings: Sequence[Heading]) -> dict[str, int]:
     """The column of each heading, by its words."""
     return {''.join(heading.words): k for k, heading in enumerate(headings) if heading.words}
 
 
 def _known(headings: list[Heading], robot: 'Robot | None') -> int:
-    headings = translated(headings)
     names = {column_name(heading) for heading in headings}
     if robot is None:
         return len(names - {''}) if {*POSITION} <= names else 0

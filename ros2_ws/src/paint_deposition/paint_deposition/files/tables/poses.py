@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
+from paint_deposition.files.tables.gauge_formats import FOLDERS
 from paint_deposition.files.tables.headings import LENGTHS, SPEEDS, Heading, find_table
 from paint_deposition.files.tables.pose_columns import (
     POSITION,
@@ -18,7 +19,6 @@ from paint_deposition.files.tables.pose_columns import (
     PoseTable,
     column_name,
     read_rotations,
-    translated,
 )
 from paint_deposition.files.tables.reading_columns import Layout, columns_of
 from paint_deposition.files.tables.sheets import read_sheets
@@ -47,12 +47,17 @@ def is_pose_table(path: Path) -> bool:
 
 
 def holds_readings(path: Path, points_given: bool) -> bool:
-    """Whether a table is one of gauge readings, and not of poses.
+    """Whether a file has gauge readings, and not poses.
 
-    A quaternion is of poses. Else a table is of readings where a file of their points is given
-    or a column is known as the thickness, or where there is no column of times, speeds or angles,
-    as few tables of readings have.
+    JSON and a gauge's folder have. In a table a quaternion is of poses. Else it is of readings
+    where a file of their points is given or a column is known as the thickness, or where there is
+    no column of times, speeds or angles, as few tables of readings have.
     """
+    if path.is_dir():
+        names_in = {file.name for file in path.iterdir()}
+        return any({*files} <= names_in for files in FOLDERS.values())
+    if not is_pose_table(path):
+        return path.suffix.lower() == '.json'
     sheets = read_sheets(path, RecordingError)
     motion = {*TIME, *SPEED, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW}
 
@@ -60,7 +65,7 @@ def holds_readings(path: Path, points_given: bool) -> bool:
         return find_table(path, RecordingError, known, sheets=sheets)[1] is not None
 
     def names(headings: list[Heading]) -> set[str]:
-        return {column_name(heading) for heading in translated(headings)}
+        return {column_name(heading) for heading in headings}
 
     if has(lambda row: {*QUATERNION} <= names(row) or {*SCALAR_FIRST} <= names(row)):
         return False

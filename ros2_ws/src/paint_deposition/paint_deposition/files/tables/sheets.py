@@ -78,14 +78,6 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
         raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
 
 
-def is_gauge_file(path: Path) -> bool:
-    """Whether a path can be that of readings only: JSON, or a gauge's folder."""
-    if path.is_dir():
-        names = {file.name for file in path.iterdir()}
-        return any({*files} <= names for files in FOLDERS.values())
-    return path.suffix.lower() == '.json'
-
-
 def text_of(cell: Cell) -> str:
     """A cell as text; a whole number of a workbook without its point."""
     return f'{cell:.15g}' if isinstance(cell, float) else cell

@@ -5,7 +5,7 @@ of each single pass.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import STENCIL_M, Experiment
 from paint_deposition.inference.readings.places import FEWEST_ON_A_LINE, passes_are_level
 from paint_deposition.part.points import STANDING_COSINE, across_axis, downhill_axis
-from paint_deposition.part.surface import Surface
 
 
 @dataclass(frozen=True)
@@ -46,47 +45,56 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
     """
     found, first = [], 0
     for experiment in study.campaign.experiments:
-        for line in _lines(experiment):
-            profile = _profile(experiment, models, *line)
-            found.append(replace(profile, rows=first + profile.rows))
+        up, across = _axes(experiment)
+        for label, members, upright, is_strip in _lines(experiment, up[2], across[2]):
+            # In order upright or across.
+            words, direction, along_m = up if upright else across
+            members = members[np.argsort(along_m[members], kind='stable')]
+            film = np.empty(0), np.empty((len(models), 0)), np.empty((0, 0))
+            if len(members) >= FEWEST_ON_A_LINE:
+                measured = experiment.measured_points.select(members)
+                places = measured.positions_m
+                if is_strip:
+                    _, aside, away_m = across if upright else up
+                    away_m = away_m[members] - np.median(away_m[members])
+                    places = places - np.outer(away_m, aside)
+                film = _film_along(
+                    experiment, models, direction, along_m[members], places, measured.normals
+                )
+            found.append(
+                Profile(experiment.name, label, words, first + members, along_m[members], *film)
+            )
         first += len(experiment)
     return found
 
 
-@dataclass(frozen=True)
-class Axis:
-    """A direction in which the readings of a line follow each other."""
-
-    words: str
-    direction: np.ndarray  # (3,) unit vector
-    origin_m: float  # what counts as 0 along it [m]
-
-    def of(self, positions_m: np.ndarray) -> np.ndarray:
-        """(n,) coordinates of positions (n, 3) along it [m]."""
-        return positions_m @ self.direction - self.origin_m
+# A direction in which the readings of a line follow each other: in words, as a unit vector (3,),
+# and the coordinate of each point of the experiment along it (P,) [m].
+Axis = tuple[str, np.ndarray, np.ndarray]
 
 
-def _axes(surface: Surface) -> tuple[Axis, Axis]:
+def _axes(experiment: Experiment) -> tuple[Axis, Axis]:
     """Up the part and across it; a part that lies has no height, but a far end."""
+    surface, positions_m = experiment.surface, experiment.measured_points.positions_m
     right = across_axis(surface.outward, surface.down)
-    across = Axis('across, to the right from the gun', right, float(surface.centre_m @ right))
+    across_m = positions_m @ right - float(surface.centre_m @ right)
     words, up = 'height above the lowest point', -surface.down
     if abs(surface.outward @ surface.down) > STANDING_COSINE:
         words, up = (
             'along the part, from its near end',
             -downhill_axis(surface.outward, surface.down),
         )
-    return Axis(words, up, float((surface.vertices_m @ up).min())), across
+    height_m = positions_m @ up - float((surface.vertices_m @ up).min())
+    return (words, up, height_m), ('across, to the right from the gun', right, across_m)
 
 
-def _lines(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
+def _lines(
+    experiment: Experiment, height_m: np.ndarray, across_m: np.ndarray
+) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
     """Label and members of each group or, without any, of strips that cross the passes.
 
     With each: whether it is longer upright than across, and whether it is a strip.
     """
-    up, across = _axes(experiment.surface)
-    positions_m = experiment.measured_points.positions_m
-    height_m, across_m = up.of(positions_m), across.of(positions_m)
     labels = sorted({str(g) for g in experiment.groups if g}, key=_natural)
     for label in labels:
         members = np.flatnonzero(experiment.groups == label)
@@ -109,30 +117,9 @@ def _natural(label: str) -> tuple:
     return (label.rstrip('0123456789'), int(digits[-1]) if digits else 0, label)
 
 
-def _profile(
-    experiment: Experiment, models: Sequence[DepositionModel], label: str, members: np.ndarray,
-    upright: bool, is_strip: bool,
-) -> Profile:  # fmt: skip
-    """Profile of some of an experiment's points, in order upright or across."""
-    up, across = _axes(experiment.surface)
-    axis, other = (up, across) if upright else (across, up)
-    along = axis.of(experiment.measured_points.positions_m[members])
-    order = np.argsort(along, kind='stable')
-    members, position = members[order], along[order]
-    film = np.empty(0), np.empty((len(models), 0)), np.empty((0, 0))
-    if len(members) >= FEWEST_ON_A_LINE:
-        measured = experiment.measured_points.select(members)
-        places = measured.positions_m
-        if is_strip:
-            away = other.of(places)
-            places = places - np.outer(away - np.median(away), other.direction)
-        film = _film_along(experiment, models, axis, position, places, measured.normals)
-    return Profile(experiment.name, label, axis.words, members, position, *film)
-
-
 def _film_along(
-    experiment: Experiment, models: Sequence[DepositionModel], axis: Axis, position_m: np.ndarray,
-    places: np.ndarray, normals: np.ndarray,
+    experiment: Experiment, models: Sequence[DepositionModel], direction: np.ndarray,
+    position_m: np.ndarray, places: np.ndarray, normals: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """Positions, films of the models and of each pass alone, through places and normals (n, 3)."""
     low, high = position_m[[0, -1]]
@@ -144,8 +131,8 @@ def _film_along(
         np.interp(at, position_m, column) for column in np.hstack([places, normals]).T
     ])  # fmt: skip
     for end, outside in ((0, at < low), (-1, at > high)):
-        way = axis.direction - (axis.direction @ normals[end]) * normals[end]
-        way /= way @ axis.direction
+        way = direction - (direction @ normals[end]) * normals[end]
+        way /= way @ direction
         line[outside, :3] += np.outer(at[outside] - position_m[end], way)
     # Beyond the first and last reading lines go on for as far as readings are apart, but not off
     # the surface by more than 3 mm. Between readings they break where they are 20 mm off it, at a

@@ -111,19 +111,24 @@ def _described(
 
 
 def interpolation_matrix(
-    surface: Surface, positions_m: np.ndarray, normals: np.ndarray, radius_m: float | None = None
-) -> csr_matrix:
+    surface: Surface, positions_m: np.ndarray, normals: np.ndarray
+) -> tuple[csr_matrix, np.ndarray]:
     """Matrix (V, P) that interpolates values at points over the surface around them.
 
-    Each vertex takes a mean of the points within the radius on its side of the part, weighted by
+    Each vertex takes a mean of the points within a radius on its side of the part, weighted by
     a smooth kernel: single readings are noisy, and what matters is where neighbours agree. The
-    row of a vertex without any is empty.
+    radius is somewhat more than the usual distance between neighbouring points, 25 to 90 mm.
 
     Args:
         positions_m, normals: (P, 3) points on its surface.
-        radius_m: default: ``radius_of_readings_m``.
+
+    Returns:
+        The matrix, and (V,) whether any point is in reach of the vertex, else its row is empty.
     """
-    radius_m = radius_m or radius_of_readings_m(positions_m)
+    radius_m = 0.09
+    if len(positions_m) > 1:
+        nearest = cKDTree(positions_m).query(positions_m, k=2)[0][:, 1]
+        radius_m = min(max(1.8 * float(np.median(nearest)), 0.025), radius_m)
     near = cKDTree(surface.vertices_m).sparse_distance_matrix(
         cKDTree(positions_m), radius_m, output_type='ndarray'
     )
@@ -134,34 +139,5 @@ def interpolation_matrix(
     shape = (len(surface.vertices_m), len(positions_m))
     matrix = csr_matrix((weight, (near['i'], near['j'])), shape=shape)
     total = np.asarray(matrix.sum(axis=1)).ravel()
-    return csr_matrix(diags(1.0 / np.where(total > 0.0, total, 1.0)) @ matrix)
-
-
-def reached(matrix: csr_matrix) -> np.ndarray:
-    """(V,) whether any point is within reach of the vertex."""
-    return np.diff(matrix.indptr) > 0
-
-
-def interpolate_over_surface(
-    surface: Surface, positions_m: np.ndarray, normals: np.ndarray, residual_um: np.ndarray
-) -> np.ndarray:
-    """Residual at each vertex (V,) [um], NaN where no reading is near.
-
-    Args:
-        positions_m, normals: (P, 3) readings on its surface.
-        residual_um: (P,) measured minus predicted.
-    """
-    matrix = interpolation_matrix(surface, positions_m, normals)
-    return np.where(reached(matrix), matrix @ residual_um, np.nan)
-
-
-def radius_of_readings_m(positions_m: np.ndarray) -> float:
-    """Radius around a reading within which the surface is coloured by it [m].
-
-    Somewhat more than the usual distance between neighbouring readings.
-    """
-    largest_m = 0.09
-    if len(positions_m) < 2:
-        return largest_m
-    nearest = cKDTree(positions_m).query(positions_m, k=2)[0][:, 1]
-    return min(max(1.8 * float(np.median(nearest)), 0.025), largest_m)
+    matrix = csr_matrix(diags(1.0 / np.where(total > 0.0, total, 1.0)) @ matrix)
+    return matrix, np.diff(matrix.indptr) > 0

@@ -48,17 +48,15 @@ def left_out_lines(taken: Readings, used: np.ndarray) -> list[str]:
         here = taken.point == label
         if np.count_nonzero(here) == 1:
             continue
-        out, kept = taken.thickness_um[here & ~used], taken.thickness_um[here & used]
-        beside = f' beside {_listed(kept)}' if len(kept) else ' contradict each other'
+        out, kept = (
+            ', '.join(f'{value:.4g}' for value in taken.thickness_um[here & which])
+            for which in (~used, used)
+        )
         lines.append(
-            f"point '{label}': {_listed(out)} µm{beside}; left out of the fit, measure "
-            f'{"it" if len(kept) else "there"} again'
+            f"point '{label}': {out} µm{f' beside {kept}' if kept else ' contradict each other'}; "
+            f'left out of the fit, measure {"it" if kept else "there"} again'
         )
     return lines
-
-
-def _listed(thickness_um: np.ndarray) -> str:
-    return ', '.join(f'{value:.4g}' for value in thickness_um)
 
 
 def _gross(readings: Readings) -> np.ndarray:
