@@ -19,7 +19,7 @@ from paint_deposition.motion.programmed import timed
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones, Zones
+from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.faces import PartPlan
 from paint_deposition.planning.faces import plan_faces as planned_faces
@@ -139,7 +139,7 @@ def plan_faces(
 
 def _with_zones(
     surface: Surface, zones: Zones | None, wanted: dict[str, Any]
-) -> tuple[PlanRequest, PointZones | None]:
+) -> tuple[PlanRequest, Zones | None]:
     """The request, and the zones of the vertices: their targets need speeds along the passes."""
     if zones is None:
         return PlanRequest(**wanted), None

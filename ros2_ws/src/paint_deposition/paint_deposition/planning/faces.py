@@ -22,7 +22,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 from paint_deposition.planning.passes import PlannedPass, plan_passes, planned_moves, trajectory_of
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.planned_film import (
@@ -85,7 +85,7 @@ def plan_faces(
     widest_rad: float = WIDEST_RAD,
     envelope: GunEnvelope | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
-    zones: PointZones | None = None,
+    zones: Zones | None = None,
 ) -> PartPlan:
     """Split a part into faces, plan each, blend them, and order them for least travel.
 

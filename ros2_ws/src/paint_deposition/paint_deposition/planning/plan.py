@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.passes import (
     WAYPOINT_STEP_M,
@@ -102,7 +102,7 @@ def plan(
     request: PlanRequest,
     frame_id: str = '',
     progress: Callable[[str, float], None] = lambda what, share: None,
-    zones: PointZones | None = None,
+    zones: Zones | None = None,
 ) -> Plan:
     """Plan passes and simulate their film; ``progress`` gets the step and its share, 0 to 1.
 
