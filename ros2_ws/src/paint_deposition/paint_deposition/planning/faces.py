@@ -163,7 +163,7 @@ def _blended(
     area_m2 = np.where(wanted.region, surface.vertex_areas_m2, 0.0)
     weight = area_m2 / area_m2.sum()
     target = request.target_um if request.speed_m_per_s is None else None
-    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    integrator = FilmIntegrator(surface.points(), model, occluder=surface)
     overspray_m, unblended, tried = 0.0, math.nan, []
     # Margins along the seams, as shares of the overspray.
     shares = (0.0, 0.35, 0.7, 1.0) if len(faces) > 1 else (0.0,)

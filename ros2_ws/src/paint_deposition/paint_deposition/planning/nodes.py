@@ -171,7 +171,7 @@ class FilmAtPoints:
         self.model, self._share = model, share
         self._surface, self._rows = surface, rows
         points = surface.points().select(rows)
-        self._integrator = FilmIntegrator(points, model, occluder=surface.occluder)
+        self._integrator = FilmIntegrator(points, model, occluder=surface)
         narrow = min(min(p.sigma1_m, p.sigma2_m) for p in model.patterns)
         self.step_m = max(model.max_step_m, narrow / 6.0)
 
@@ -208,6 +208,6 @@ class FilmAtPoints:
         if not any(effect.acts('on_film') for effect in self.model.effects):
             return 1.0
         surface = self._surface
-        whole = FilmIntegrator(surface.points(), self.model, occluder=surface.occluder)
+        whole = FilmIntegrator(surface.points(), self.model, occluder=surface)
         raw = whole.raw_of(path)
         return np.divide(whole.film_um, raw, out=np.ones(len(raw)), where=raw > 0.0)[self._rows]

@@ -128,7 +128,7 @@ def simulated(
 ) -> tuple[np.ndarray, PaintUsed]:
     """(V,) film of a motion [um], and what it sprays."""
     path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
-    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    integrator = FilmIntegrator(surface.points(), model, occluder=surface)
     integrator.add(path, lambda done: progress(done / len(path)))
     return integrator.film_um, integrator.used
 

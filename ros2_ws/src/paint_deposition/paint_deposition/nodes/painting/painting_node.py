@@ -165,7 +165,7 @@ class PaintingNode(ManagedNode, ABC):
         """An unpainted film for the model of each gun."""
         named = ('max_pose_gap_s', 'trigger_latency_s', 'pose_memory')
         options: dict[str, Any] = {name: self.values[name] for name in named}
-        options |= {'precision': self.PRECISION, 'occluder': surface.occluder}
+        options |= {'precision': self.PRECISION, 'occluder': surface}
         return LiveFilms(tuple(LiveFilm(points, model, **options) for model in models))
 
     def _take_part(self, part: PreparedPart) -> None:
