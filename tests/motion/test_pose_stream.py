@@ -6,8 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.pose_stream import MotionLog, PoseBatch, PoseScreen, TriggerChange
-from paint_deposition.motion.stream_quality import SpeedNow, StreamSteps
+from paint_deposition.motion.pose_stream import (
+    NO_POSES,
+    MotionLog,
+    PoseBatch,
+    PoseScreen,
+    TriggerChange,
+    newest_poses,
+)
+from paint_deposition.motion.stream_quality import StreamSteps
 from paint_deposition.motion.trajectory import FlowSchedule, Trajectory, relative_flow
 
 GAP_NS = 250
@@ -166,18 +173,17 @@ def test_what_robots_do_is_no_jump():
     assert (steps.jumps, steps.fastest_m_per_s) == (0, 0.0)
 
 
-@pytest.mark.parametrize('batch', [1, 12, 500])
-def test_the_speed_is_that_of_the_last_fifth_of_a_second(batch):
+@pytest.mark.parametrize('size', [1, 12, 500])
+def test_the_speed_is_that_of_the_last_fifth_of_a_second(size):
     positions = along(np.where(np.arange(499) < 300, 0.5, 0.2))
-    speed = SpeedNow()
-    assert np.isnan(speed.m_per_s)
-    for start in range(0, 324, batch):
-        rows = slice(start, min(start + batch, 324))
-        speed.add(STAMPS_NS[rows], positions[rows])
+    poses, newest = batch(STAMPS_NS, positions=positions), NO_POSES
+    assert np.isnan(newest.speed_m_per_s)
+    for start in range(0, 324, size):
+        newest = newest_poses(newest, poses.select(slice(start, min(start + size, 324))))
     # 27 steps at the first speed, 23 at the second.
-    assert speed.m_per_s == pytest.approx((27 * 0.5 + 23 * 0.2) / 50, rel=1e-9)
-    speed.add(STAMPS_NS[:2], along(np.full(1, 0.3)))
-    assert speed.m_per_s == pytest.approx(0.3, rel=1e-9)
+    assert newest.speed_m_per_s == pytest.approx((27 * 0.5 + 23 * 0.2) / 50, rel=1e-9)
+    again = batch(STAMPS_NS[:2], positions=along(np.full(1, 0.3)))
+    assert newest_poses(newest, again).speed_m_per_s == pytest.approx(0.3, rel=1e-9)
 
 
 def test_shapes_must_match_and_flows_be_possible():

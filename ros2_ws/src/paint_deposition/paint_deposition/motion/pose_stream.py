@@ -1,5 +1,6 @@
 """A stream of poses and trigger changes: which can be followed, and a log to follow it again."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -70,8 +71,25 @@ class PoseBatch:
         columns = zip(*(vars(batch).values() for batch in batches), strict=True)
         return PoseBatch(*map(np.concatenate, columns))
 
+    @property
+    def speed_m_per_s(self) -> float:
+        """Way of the TCP over time [m/s]; NaN while there are no two times."""
+        if len(self) < 2 or self.stamps_ns[-1] <= self.stamps_ns[0]:
+            return math.nan
+        way_m = np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1).sum()
+        return float(way_m / (1e-9 * (self.stamps_ns[-1] - self.stamps_ns[0])))
+
 
 NO_POSES = PoseBatch(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 4)))
+
+
+def newest_poses(before: PoseBatch, poses: PoseBatch) -> PoseBatch:
+    """Those of the last 0.2 s after some more; stamps that go back begin anew."""
+    if not len(before) or poses.stamps_ns[0] > before.stamps_ns[-1]:
+        poses = PoseBatch.joined([before, poses])
+    # Single steps carry the noise of the encoders and the jitter of the stamps.
+    recent = np.flatnonzero(poses.stamps_ns >= poses.stamps_ns[-1] - 200_000_000)
+    return poses.select(recent[-2000:])
 
 
 def events_of(
