@@ -41,8 +41,8 @@ def recommend_command(
     results.write(answer, model=file.model, made_from=inputs(model_file=model_file))
     lines = [answer.sentence, f'SB50 of one pass: {1e3 * answer.sb50_m:.0f} mm']
     lines += (
-        f'minimum: sigma_n {100 * minimum.sigma_n:.2f} % at {1e3 * minimum.index_m:.0f} mm'
-        for minimum in answer.minima
+        f'minimum: sigma_n {100 * sigma_n:.2f} % at {1e3 * index_m:.0f} mm'
+        for index_m, sigma_n in answer.minima
     )
     lines += (
         f'within tolerance: {1e3 * low:.0f} to {1e3 * high:.0f} mm'

@@ -141,8 +141,8 @@ class IndexPlanner(PaintNode):
         response.index_range_m = list(answer.index_range_m)
         response.window_low_m = [low for low, _ in answer.windows_m]
         response.window_high_m = [high for _, high in answer.windows_m]
-        response.minima_index_m = [minimum.index_m for minimum in answer.minima]
-        response.minima_sigma_n = [minimum.sigma_n for minimum in answer.minima]
+        response.minima_index_m = [index_m for index_m, _ in answer.minima]
+        response.minima_sigma_n = [sigma_n for _, sigma_n in answer.minima]
         response.passes = answer.passes or 0
         response.curve_index_m = answer.curve.index_m.tolist()
         response.curve_sigma_n = answer.curve.sigma_n.tolist()

@@ -98,9 +98,9 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
         for low, high in answer.windows_m:
             axes.axvspan(MM * low, MM * high, color='#d9ecf0', linewidth=0.0, zorder=0)
     axes.plot(MM * answer.curve.index_m, 100.0 * answer.curve.sigma_n, color=ACCENT, linewidth=1.8)
-    for minimum in answer.minima:
+    for index_m, sigma_n in answer.minima:
         axes.plot(
-            MM * minimum.index_m, 100.0 * minimum.sigma_n, 'o', markersize=5,
+            MM * index_m, 100.0 * sigma_n, 'o', markersize=5,
             markerfacecolor='white', markeredgecolor=ACCENT, markeredgewidth=1.5,
         )  # fmt: skip
     chosen = MM * answer.index_m, 100.0 * answer.sigma_n
