@@ -128,55 +128,34 @@ class MotionLog:
         self.pose_memory = pose_memory
         self.poses = self.changes = 0
         self.complete = True
-        # With room for more than came.
-        self._kept = NO_POSES
-        # With the number of poses that came before.
-        self._changes: list[tuple[int, TriggerChange]] = []
+        self._events: list[TriggerChange | PoseBatch] = []
 
     def add(self, event: TriggerChange | PoseBatch) -> None:
         """Note what came."""
-        if not self.complete:
+        poses, changes = (0, 1) if isinstance(event, TriggerChange) else (len(event), 0)
+        if not self.complete or self.poses + self.changes + poses + changes > self.pose_memory:
+            self.complete, self._events = False, []
             return
-        size = 1 if isinstance(event, TriggerChange) else len(event)
-        if self.poses + self.changes + size > self.pose_memory:
-            self.complete = False
-            self._kept, self._changes, self.changes = NO_POSES, [], 0
-        elif isinstance(event, TriggerChange):
-            self._changes.append((self.poses, event))
-            self.changes += 1
-            return
-        else:
-            end = self.poses + len(event)
-            if end > len(self._kept):  # readers go on with the old one
-                rows = np.arange(2 * end) % max(len(self._kept), 1)
-                self._kept = (self._kept if self.poses else event).select(rows)
-            for kept, new in zip(vars(self._kept).values(), vars(event).values(), strict=True):
-                kept[self.poses : end] = new
-        self.poses += len(event) if isinstance(event, PoseBatch) else 0
+        self._events.append(event)
+        self.poses += poses
+        self.changes += changes
 
     def events(self, poses: int = 0, changes: int = 0) -> Iterator[TriggerChange | PoseBatch]:
         """What came until now, after so many poses and changes."""
-        end, kept = self.poses, self._kept  # in this order: what is kept may grow meanwhile
-        if not self.complete:
-            return
-        for before, change in self._changes[changes:]:
-            if before > end:
-                break
-            yield from _rows(kept, poses, before)
-            yield change
-            poses = before
-        yield from _rows(kept, poses, end)
+        for event in [*self._events]:  # more may come meanwhile
+            if isinstance(event, TriggerChange):
+                if changes <= 0:
+                    yield event
+                changes -= 1
+            else:
+                for row in range(max(poses, 0), len(event), BATCH_POSES):
+                    yield event.select(slice(row, row + BATCH_POSES))
+                poses -= len(event)
 
     def first_poses(self, count: int) -> PoseBatch | None:
         """The first poses that are kept, ``count`` if there are so many."""
-        batches = list(_rows(self._kept, 0, min(count, self.poses if self.complete else 0)))
-        return PoseBatch.joined(batches) if batches else None
-
-
-def _rows(kept: PoseBatch, start: int, stop: int) -> Iterator[PoseBatch]:
-    """The poses of this range."""
-    for row in range(start, stop, BATCH_POSES):
-        yield kept.select(slice(row, min(row + BATCH_POSES, stop)))
+        batches = [event for event in self.events() if isinstance(event, PoseBatch)]
+        return PoseBatch.joined(batches).select(slice(count)) if batches else None
 
 
 # A number beyond this is damage too, and its square must be one in single precision [m].
