@@ -100,7 +100,8 @@ def connected(rows: np.ndarray, count: int) -> tuple[int, np.ndarray]:
     """
     joined = np.repeat(rows[:, 0], rows.shape[1] - 1), rows[:, 1:].ravel()
     links = scipy.sparse.coo_array((np.ones(len(joined[0]), bool), joined), shape=(count, count))
-    return scipy.sparse.csgraph.connected_components(links, directed=False)
+    groups, group = scipy.sparse.csgraph.connected_components(links, directed=False)
+    return groups, group.astype(np.int64)
 
 
 def near_pairs(
