@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.motion.path import write_rotation
 from paint_deposition.motion.trajectory import Trajectory
 
 # RAPID writes quaternions with four digits; further off is damage, not rounding.
@@ -47,13 +48,8 @@ class Rigid:
         """From [x y z qx qy qz qw]; the quaternion is normalised."""
         quaternion = np.asarray(values[3:], dtype=float)
         x, y, z, w = (quaternion / np.linalg.norm(quaternion)).tolist()
-        rotation = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        rotation = np.empty((3, 3))
+        write_rotation(rotation, (x, y, z, w))
         return Rigid(rotation, (x, y, z, w), np.asarray(values[:3], dtype=float))
 
     def inverse(self) -> 'Rigid':
