@@ -117,7 +117,7 @@ def test_poses_of_any_batches_come_back_to_the_last_bit(sizes):
         assert np.array_equal(np.concatenate([vars(batch)[name] for batch in batches]), column)
 
 
-def test_who_has_followed_a_part_gets_the_rest_and_the_first_poses_are_found():
+def test_who_has_followed_a_part_gets_the_rest():
     events = [_poses(0, 5), TriggerChange(5, 1.0), _poses(5, 5000), TriggerChange(9000, 0.0)]
     log, follower = _log(*events), MotionLog()
     for event in log.events():
@@ -127,12 +127,6 @@ def test_who_has_followed_a_part_gets_the_rest_and_the_first_poses_are_found():
     assert not list(log.events(follower.poses, follower.changes))
     log.add(_poses(10_000, 3))
     assert _in_words(log.events(follower.poses, follower.changes)) == [10_000, 10_001, 10_002]
-    log = MotionLog()
-    for first in range(0, 20, 5):
-        log.add(_poses(first, 5))
-        log.add(TriggerChange(first, 1.0))
-    assert np.array_equal(log.first_poses(7).stamps_ns, np.arange(7))
-    assert len(log.first_poses(100)) == 20
 
 
 PERIOD_NS = 4_000_000

@@ -152,11 +152,6 @@ class MotionLog:
                     yield event.select(slice(row, row + BATCH_POSES))
                 poses -= len(event)
 
-    def first_poses(self, count: int) -> PoseBatch | None:
-        """The first poses that are kept, ``count`` if there are so many."""
-        batches = [event for event in self.events() if isinstance(event, PoseBatch)]
-        return PoseBatch.joined(batches).select(slice(count)) if batches else None
-
 
 # A number beyond this is damage too, and its square must be one in single precision [m].
 FARTHEST_M = 1e6

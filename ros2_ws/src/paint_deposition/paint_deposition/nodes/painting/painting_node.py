@@ -16,6 +16,7 @@ from paint_deposition.files.effect_file import read_effect_file, try_effect
 from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.trajectory import BEFORE_ALL_NS
 from paint_deposition.nodes.frames import PartFrame
 from paint_deposition.nodes.managed_node import ManagedNode
@@ -312,9 +313,11 @@ class PaintingNode(ManagedNode, ABC):
         """
         most = 2000
         for number in tuple(self._guns_to_orient):
-            poses = self.film.guns[number].log.first_poses(most)
-            if poses is None:
+            events = self.film.guns[number].log.events()
+            batches = [event for event in events if isinstance(event, PoseBatch)]
+            if not batches:
                 continue
+            poses = PoseBatch.joined(batches).select(slice(most))
             positions, axes = poses.finite_axes()
             front, back, _ = facing(self.surface, positions, axes)
             pointing = front + back
