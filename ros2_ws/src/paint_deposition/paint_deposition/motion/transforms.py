@@ -274,9 +274,9 @@ class FrameTree:
         still = self._still
         steps = [
             still[frame][1] if frame in still else self._pose_at(frame, stamp_ns)
-            for frame in reversed(chain)
+            for frame in chain
         ]
-        return reduce(matmul, steps) if steps else None
+        return reduce(matmul, reversed(steps)) if steps else None
 
     def _pose_at(self, frame: str, stamp_ns: int) -> Rigid:
         """In its parent, interpolated between the transforms before and after."""
