@@ -182,12 +182,13 @@ def test_a_screen_before_the_gun_is_met_while_it_passes_and_told_from_one_in_it(
 
 
 @pytest.mark.slow
-def test_a_plan_on_which_the_gun_touches_the_part_is_refused_or_says_so(tmp_path):
+def test_a_plan_on_which_the_gun_touches_the_part_is_refused_and_one_too_near_says_so(tmp_path):
     """The gun's body reaches back from the TCP, 30 mm from the panel: the screen is in its way."""
-    low = {'speed_m_per_s': 0.3, 'standoff_m': 0.03, 'smoothing_radius_m': 0.3}
-    with pytest.raises(PlanError, match=r'the gun touches the part at .* allow_contact keeps it'):
-        pd.plan(panel_with_screen(), **low)
-    kept = pd.plan(panel_with_screen(), allow_contact=True, **low)
-    touched, *_ = [line for line in kept.warnings if 'the gun touches the part' in line]
+    wanted = {'speed_m_per_s': 0.3, 'smoothing_radius_m': 0.3}
+    with pytest.raises(PlanError, match=r'the gun touches the part at .* give a greater standoff'):
+        pd.plan(panel_with_screen(), standoff_m=0.03, **wanted)
+    reaching = pd.GunEnvelope(radius_m=0.04, before_m=0.2)
+    kept = pd.plan(panel_with_screen(), envelope=reaching, **wanted)
+    near, *_ = [line for line in kept.warnings if 'the part is too near before the gun' in line]
     pd.write(kept, tmp_path)
-    assert f'! WARNING: {touched}' in (tmp_path / 'passes.mod').read_text()
+    assert f'! WARNING: {near}' in (tmp_path / 'passes.mod').read_text()

@@ -164,12 +164,6 @@ class PlanRequest(SpeedLimits, PassRequest):
         5e-3, 'With --optimise: the same for the time of the plan without it.', least=0.0
     )
 
-    allow_contact: bool = given(
-        False,
-        'Keep passes on which the gun touches the part, and say so in the head of the robot '
-        'program; default: they are refused.',
-    )
-
     @model_validator(mode='after')
     def _side_and_index(self) -> 'PlanRequest':
         if self.outward is not None and not any(self.outward):
