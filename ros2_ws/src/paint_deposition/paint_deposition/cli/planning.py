@@ -42,7 +42,7 @@ def recommend_command(
     lines = [answer.sentence, f'SB50 of one pass: {1e3 * answer.sb50_m:.0f} mm']
     lines += (
         f'minimum: sigma_n {100 * sigma_n:.2f} % at {1e3 * index_m:.0f} mm'
-        for index_m, sigma_n in answer.minima
+        for index_m, sigma_n in answer.curve.minima
     )
     lines += (
         f'within tolerance: {1e3 * low:.0f} to {1e3 * high:.0f} mm'

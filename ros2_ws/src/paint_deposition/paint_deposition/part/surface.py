@@ -107,10 +107,10 @@ class Surface:
         single_m = half_edges_m(vertices_m, faces, single)
         folded_m = half_edges_m(vertices_m, faces, paired[rim, 0])
         rim_m = np.concatenate([without_seams(single_m), folded_m])
-        strip = creases.strip_vertices(vertices_m[origin], patches, paired[rim].ravel())
         corners = vertices_m[origin]
         read_normals = derivatives.surface_normals(corners, patches)
         unjoined = paired[~smooth, 1], clashing.ravel(), single
+        hem = paired[rim].ravel()
         half_edges = np.concatenate([paired[:, 0], *unjoined])
         curved_edges = CurvedEdges.of(corners, read_normals, patches, half_edges)
         del paired, folds, half_edges, unjoined  # large ones, before the next are made
@@ -123,7 +123,7 @@ class Surface:
         down = np.asarray(down, dtype=np.float64)
         return Surface(
             vertices, fine, normals, vertex_areas, down / np.linalg.norm(down), rim_m, notes,
-            in_hem=creases.carried_over(strip, fine, len(vertices)),
+            in_hem=creases.strip_vertices(corners, patches, hem, fine, len(vertices)),
             curved_edges=curved_edges, neighbours=neighbours_together(vertices),
         )  # fmt: skip
 

@@ -30,15 +30,13 @@ class Recommendation:
     Attributes:
         index_m, sigma_n: the recommended index and eq. (5) there.
         index_range_m: range searched.
-        tolerance: largest sigma_n accepted, or None.
-        windows_m: index intervals in the range within tolerance.
-        minima: all local minima inside the range, index and sigma_n of each.
+        windows_m: index intervals in the range within the tolerance of the request.
         mean_um: mean film at index and speed.
         speed_m_per_s: of the passes.
         passes, cycle_time_s: for the width asked for, or None. The time runs from the first
             opening of the gun to its last closing, transfers between passes included.
         length_m: of a pass, that they were counted for.
-        curve: sigma_n over the range.
+        curve: sigma_n over the range, with all local minima inside it.
         standoff_m: TCP to plane. request: how the passes run.
         sb50_m: SB50 of one pass, its width at half its peak.
         index_drift_m: least and largest index that keep to the tolerance, or None.
@@ -50,9 +48,7 @@ class Recommendation:
     index_m: float
     sigma_n: float
     index_range_m: tuple[float, float]
-    tolerance: float | None
     windows_m: tuple[tuple[float, float], ...]
-    minima: tuple[tuple[float, float], ...]
     mean_um: float
     speed_m_per_s: float
     passes: int | None
@@ -88,12 +84,14 @@ class Recommendation:
     def to_dict(self) -> dict[str, Any]:
         """The content of ``recommendation.json``."""
         figures = {k: v for k, v in vars(self).items() if k not in ('curve', 'request')}
-        assumed = ('target_um', 'width_m', 'gun_turns', 'travel_rad', 'assumption')
+        assumed = ('target_um', 'tolerance', 'width_m', 'gun_turns', 'travel_rad', 'assumption')
         return {
             **figures,
             'travel': self.travel,
             **{name: getattr(self.request, name) for name in assumed},
-            'minima': [{'index_m': index, 'sigma_n': sigma_n} for index, sigma_n in self.minima],
+            'minima': [
+                {'index_m': index, 'sigma_n': sigma_n} for index, sigma_n in self.curve.minima
+            ],
             'curve': {
                 'index_m': self.curve.index_m.tolist(),
                 'sigma_n': self.curve.sigma_n.tolist(),
@@ -166,9 +164,7 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         index_m=index_m,
         sigma_n=sigma_n,
         index_range_m=(float(curve.index_m[0]), float(curve.index_m[-1])),
-        tolerance=tolerance,
         windows_m=tuple(windows),
-        minima=curve.minima,
         mean_um=curve.parallel.mean_um(index_m),
         speed_m_per_s=speed,
         passes=passes,

@@ -83,8 +83,8 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
     """Draw sigma_n over the index with its minima, the tolerance and the recommended index."""
     quiet(axes, 'index [mm]', r'$\sigma_N$ [%]', 'Evenness over the index, eq. (5)')
     top = 1.08 * 100.0 * float(answer.curve.sigma_n.max())
-    if answer.tolerance is not None:
-        tolerance = 100.0 * answer.tolerance
+    if answer.request.tolerance is not None:
+        tolerance = 100.0 * answer.request.tolerance
         if tolerance < top:
             axes.axhline(tolerance, color=MUTED, linewidth=0.9, linestyle='--')
             # At the end where the curve stays away from it.
@@ -98,7 +98,7 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
         for low, high in answer.windows_m:
             axes.axvspan(MM * low, MM * high, color='#d9ecf0', linewidth=0.0, zorder=0)
     axes.plot(MM * answer.curve.index_m, 100.0 * answer.curve.sigma_n, color=ACCENT, linewidth=1.8)
-    for index_m, sigma_n in answer.minima:
+    for index_m, sigma_n in answer.curve.minima:
         axes.plot(
             MM * index_m, 100.0 * sigma_n, 'o', markersize=5,
             markerfacecolor='white', markeredgecolor=ACCENT, markeredgewidth=1.5,
