@@ -15,7 +15,7 @@ from paint_deposition.motion.pose_stream import (
     newest_poses,
 )
 from paint_deposition.motion.stream_quality import StreamSteps
-from paint_deposition.motion.trajectory import FlowSchedule, Trajectory, relative_flow
+from paint_deposition.motion.trajectory import Trajectory, relative_flow
 
 GAP_NS = 250
 UNIT = (0.0, 0.0, 0.0, 1.0)
@@ -192,29 +192,3 @@ def test_shapes_must_match_and_flows_be_possible():
     for wrong in (-0.1, float('inf')):
         with pytest.raises(RecordingError, match='flow is'):
             relative_flow(True, wrong)
-
-
-def schedule(changes):
-    flow = FlowSchedule()
-    for stamp, value in changes:
-        flow.add(stamp, value)
-    return flow
-
-
-def flow_at(flow, stamps):
-    cuts, flows, _ = flow.steps()
-    return flows[np.searchsorted(cuts, stamps, side='right')]
-
-
-@given(
-    flows=st.dictionaries(st.integers(0, 50), st.sampled_from([0.0, 0.5, 1.0]), min_size=1),
-    order=st.randoms(use_true_random=False),
-    forgotten_until=st.integers(-5, 60),
-)
-def test_neither_order_nor_forgetting_matters_later(flows, order, forgotten_until):
-    expected, shuffled = schedule(sorted(flows.items())), list(flows.items())
-    order.shuffle(shuffled)
-    flow = schedule(shuffled)
-    flow.forget(forgotten_until)
-    later = np.arange(forgotten_until, 70)
-    assert np.array_equal(flow_at(flow, later), flow_at(expected, later))
