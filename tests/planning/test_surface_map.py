@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from trimesh.creation import box
 
 import paint_deposition as pd
 from booth import panel, panel_with_screen, serpentine
@@ -62,11 +63,9 @@ def test_ends_of_a_slanted_part_follow_the_pass_and_impossible_parts_are_refused
     surface = sheet(lambda x, z: 0.0 * x)
     with pytest.raises(PlanError, match='no surface faces the gun'):
         SurfaceMap(surface, pass_axes(surface, outward=(0.0, 1.0, 0.0)), 0.1)
-    box = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
-    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-             [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
+    body = box()
     with pytest.raises(PlanError, match='closed'):
-        pass_axes(pd.Surface.from_triangles(box, np.array(faces), 0.5))
+        pass_axes(pd.Surface.from_triangles(body.vertices, np.asarray(body.faces), 0.5))
 
 
 STYLE = PassStyle(0.25, 0.3, acceleration_m_per_s2=2.0, overspray_m=0.2)
