@@ -66,12 +66,6 @@ class PoseCounts:
         return asdict(self) | {'rejected': self.rejected}
 
 
-def numbered(brushes: Sequence[int] | np.ndarray) -> np.ndarray:
-    """(M,) int64 numbers of brushes, none of them where all are the only one."""
-    numbers = np.array(brushes, dtype=np.int64)
-    return numbers if np.any(numbers != ONLY_BRUSH) else numbers[:0]
-
-
 @dataclass(frozen=True)
 class Trajectory:
     """Atomizer poses as recorded, in the mesh's frame, not yet screened.
