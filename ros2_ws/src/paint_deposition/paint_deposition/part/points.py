@@ -161,7 +161,10 @@ class SurfacePoints:
             outward = outward_side(self.normals, area_m2, self.down)
         self.outward = outward
         self.centre_m = box_centre_m(self.positions_m) if centre_m is None else centre_m
-        self.extent_m = box_extent_m(self.positions_m) if extent_m is None else extent_m
+        if extent_m is None:
+            low, high = bounding_box_m(self.positions_m)
+            extent_m = high - low
+        self.extent_m = extent_m
         self.area_m2 = area_m2
         self._neighbours = neighbours
         self._blocks: dict[type, Blocks] = {}
@@ -226,12 +229,6 @@ class SurfacePoints:
             area_m2=None if self.area_m2 is None else self.area_m2[rows],
             **kept | {'slope_per_m': slopes_among},
         )  # fmt: skip
-
-
-def box_extent_m(positions_m: np.ndarray) -> np.ndarray:
-    """(3,) sides of the bounding box of (V, 3) points [m]."""
-    low, high = bounding_box_m(positions_m)
-    return high - low
 
 
 def box_words(positions_m: np.ndarray) -> str:

@@ -26,7 +26,6 @@ from paint_deposition.part.points import (
     CANCELLED,
     ONE_SIDED,
     SurfacePoints,
-    box_extent_m,
     gravity,
     heights,
     mean_normal,
@@ -229,7 +228,7 @@ class Surface:
             'down': self.down,
             'outward': self.outward,
             'centre_m': self.centre_m,
-            'extent_m': box_extent_m(self.vertices_m),
+            'extent_m': np.ptp(self.vertices_m, axis=0),
             'curvature_per_m': lambda: self._curvature_per_m(positions_m, normals),
             'edge_distance_m': lambda: edge_distance_m(positions_m, self.rim_m),
             'sky_view_factor': lambda: sky_view_factor(

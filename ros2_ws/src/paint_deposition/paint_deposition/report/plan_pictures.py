@@ -14,7 +14,6 @@ from matplotlib.patches import Patch
 
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.improvement import Improvement
@@ -127,7 +126,7 @@ def write_geometry_picture(
         2, 2, width_ratios=_ratios(sizes[0][0], sizes[1][0]),
         height_ratios=_ratios(sizes[0][1], sizes[2][1]),
     )  # fmt: skip
-    size_m = float(np.linalg.norm(box_extent_m(corners)))
+    size_m = float(np.linalg.norm(np.ptp(corners, axis=0)))
     places, names = ((0, 0), (0, 1), (1, 0)), ('from the gun', 'from its right', 'from its top')
     for place, view, name in zip(places, views, names, strict=True):
         axes = figure.add_subplot(grid[place])
