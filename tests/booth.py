@@ -108,9 +108,7 @@ def painted(
     path = motion if isinstance(motion, SprayPath) else path_of(motion)
     model = model.model_copy(update={'effects': effects})
     # By one thread, as readings are predicted: that is compiled once, in a third of the time.
-    integrator = FilmIntegrator(
-        surface.points(), model, precision, surface.occluder, parallel=False
-    )
+    integrator = FilmIntegrator(surface.points(), model, precision, surface, parallel=False)
     integrator.add(path)
     return integrator
 

@@ -142,7 +142,7 @@ def test_a_stream_paints_what_the_recording_does(effect: type[Effect]):
     model = booth.MODEL.with_effect(effect.typical())
     whole = booth.painted(booth.panel(0.3, 0.05), trajectory, effect.typical())
     part = booth.panel(0.3, 0.05)
-    live = FilmIntegrator(part.points(), model, 'double', part.occluder, parallel=False)
+    live = FilmIntegrator(part.points(), model, 'double', part, parallel=False)
     for piece in booth.in_batches(trajectory, 7, model.needs_whole_strokes):
         live.add(piece)
     assert np.array_equal(live.gauge_um, whole.gauge_um)
@@ -156,7 +156,7 @@ def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect])
     stencil_m = 0.01 if effect.needs_slope else None
     at = booth.door().at(booth.door().vertices_m[some], booth.door().normals[some], stencil_m)
     model = booth.MODEL.with_effect(effect.typical())
-    integrator = FilmIntegrator(at, model, 'double', booth.door().occluder, parallel=False)
+    integrator = FilmIntegrator(at, model, 'double', booth.door(), parallel=False)
     integrator.add(PASSES)
     readings = integrator.gauge_um[: len(sheet[some])]
     # A stencil sees more than the triangles around a vertex.

@@ -18,6 +18,7 @@ from paint_deposition.film.layout import SIGHT_STEP_M, emission_points_m, term_w
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.visibility import sees
 from patterns import PATTERNS
 from scenes import lying_plane, stamps_ns, straight_pass, weaving
 
@@ -234,7 +235,7 @@ def traced_everywhere(surface, path):
     for row, origin in enumerate(origins):
         if np.linalg.norm(origin - eye) > SIGHT_STEP_M:
             eye = origin
-            seen = surface.occluder.sees(eye, surface.vertices_m)
+            seen = sees(surface.obstacle, eye, surface.vertices_m)
         step.reset()
         step.add(path.select(slice(row, row + 1)))
         film, open_film = film + step.film_um * (1.0 - 0.8 * ~seen), open_film + step.film_um
@@ -250,7 +251,7 @@ def expected(tray, path):
 
 @pytest.mark.parametrize('at_once', [10_000, 7])
 def test_the_film_is_that_of_all_points_traced(tray, path, expected, at_once):
-    film = FilmIntegrator(tray.points(), SHADED, 'double', tray.occluder)
+    film = FilmIntegrator(tray.points(), SHADED, 'double', tray)
     for start in range(0, len(path), at_once):
         film.add(path.select(slice(start, start + at_once)))
     # Beyond the pattern's reach, where the flux is a millionth of the peak, nothing is traced.
@@ -259,10 +260,10 @@ def test_the_film_is_that_of_all_points_traced(tray, path, expected, at_once):
 
 def test_a_prepared_path_serves_a_wider_pattern(tray, path):
     wide = SHADED.model_copy(update={'planar': PlanarPattern(r_m=0.2, sigma1_m=0.09)})
-    prepared = FilmIntegrator(tray.points(), SHADED, 'double', tray.occluder)
+    prepared = FilmIntegrator(tray.points(), SHADED, 'double', tray)
     steps = prepared.steps(path)
     prepared.use(wide)
     prepared.paint(steps)
-    film = FilmIntegrator(tray.points(), wide, 'double', tray.occluder)
+    film = FilmIntegrator(tray.points(), wide, 'double', tray)
     film.add(path)
     assert np.abs(prepared.film_um - film.film_um).max() < 1e-5 * film.film_um.max()

@@ -14,7 +14,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import PaintUsed, efficiency, film_statistics
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.part.zones import PointZones, Zone, Zones
+from paint_deposition.part.zones import Zone, Zones
 from scenes import lying_plane, stamps_ns, straight_pass
 
 
@@ -66,9 +66,8 @@ def test_zones_share_the_area_and_add_up_to_the_whole():
     )
     x = np.array([-0.9, -0.5, -0.1, 0.1, 0.5, 0.9, 2.0])
     positions = np.stack([x, 0 * x, 0 * x], axis=1)
-    numbers = Zones((left, right)).of(positions, positions)
-    np.testing.assert_array_equal(numbers, [0, 0, 0, 1, 1, 1, -1])
-    zones = PointZones(Zones((left, right)), numbers)
+    zones = Zones((left, right)).at(positions, positions)
+    np.testing.assert_array_equal(zones.number, [0, 0, 0, 1, 1, 1, -1])
     film = np.array([9.0, 12.5, 0.0, 20.0, 21.0, 30.0, 50.0])
     area = np.array([0.3, 0.1, 1.0, 0.2, 0.2, 0.1, 5.0])
     stats = film_statistics(film, area, 1.0, zones=zones)

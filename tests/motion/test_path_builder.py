@@ -89,6 +89,29 @@ def test_a_stream_that_begins_again_is_painted_again(whole_strokes):
         assert np.array_equal(getattr(path, name), np.concatenate([column, column]))
 
 
+@given(
+    flows=st.dictionaries(st.integers(0, 199), st.sampled_from([0.0, 0.5, 1.0]), min_size=1),
+    order=st.randoms(use_true_random=False),
+    sizes=st.lists(st.integers(1, 90), min_size=1),
+)
+def test_neither_order_nor_what_is_forgotten_of_the_changes_matters(flows, order, sizes):
+    """Flows from rows of the motion on, told in any order before poses in any batches."""
+    motion, shuffled = scenes.straight_pass(TIMES_S), list(flows.items())
+    order.shuffle(shuffled)
+    builder = PathBuilder()
+    for row, flow in shuffled:
+        builder.add_trigger(motion.stamps_ns[row], flow)
+    pieces = []
+    for end, size in zip(np.cumsum([*sizes, 200]), [*sizes, 200], strict=True):
+        builder.add_poses(scenes.poses(motion, slice(end - size, end)))
+        pieces.append(builder.take())
+    path = SprayPath.joined([*pieces, builder.take(finish=True)])
+    begun = np.searchsorted(sorted(flows), np.searchsorted(motion.stamps_ns, path.stamp_ns) - 1,
+                            side='right')  # fmt: skip
+    expected = np.append(0.0, [flows[row] for row in sorted(flows)])[begun]
+    assert np.array_equal(path.flow, expected)
+
+
 @pytest.mark.parametrize('count', [0, 1])
 def test_too_few_poses_paint_nothing(count):
     few = Trajectory(np.arange(count), np.zeros((count, 3)), np.eye(4)[:count])

@@ -6,9 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.pose_stream import MotionLog, PoseBatch, PoseScreen, TriggerChange
-from paint_deposition.motion.stream_quality import SpeedNow, StreamSteps
-from paint_deposition.motion.trajectory import FlowSchedule, Trajectory, relative_flow
+from paint_deposition.motion.pose_stream import (
+    NO_POSES,
+    MotionLog,
+    PoseBatch,
+    PoseScreen,
+    TriggerChange,
+    newest_poses,
+)
+from paint_deposition.motion.stream_quality import StreamSteps
+from paint_deposition.motion.trajectory import Trajectory, relative_flow
 
 GAP_NS = 250
 UNIT = (0.0, 0.0, 0.0, 1.0)
@@ -110,7 +117,7 @@ def test_poses_of_any_batches_come_back_to_the_last_bit(sizes):
         assert np.array_equal(np.concatenate([vars(batch)[name] for batch in batches]), column)
 
 
-def test_who_has_followed_a_part_gets_the_rest_and_the_first_poses_are_found():
+def test_who_has_followed_a_part_gets_the_rest():
     events = [_poses(0, 5), TriggerChange(5, 1.0), _poses(5, 5000), TriggerChange(9000, 0.0)]
     log, follower = _log(*events), MotionLog()
     for event in log.events():
@@ -120,12 +127,6 @@ def test_who_has_followed_a_part_gets_the_rest_and_the_first_poses_are_found():
     assert not list(log.events(follower.poses, follower.changes))
     log.add(_poses(10_000, 3))
     assert _in_words(log.events(follower.poses, follower.changes)) == [10_000, 10_001, 10_002]
-    log = MotionLog()
-    for first in range(0, 20, 5):
-        log.add(_poses(first, 5))
-        log.add(TriggerChange(first, 1.0))
-    assert np.array_equal(log.first_poses(7).stamps_ns, np.arange(7))
-    assert len(log.first_poses(100)) == 20
 
 
 PERIOD_NS = 4_000_000
@@ -166,18 +167,17 @@ def test_what_robots_do_is_no_jump():
     assert (steps.jumps, steps.fastest_m_per_s) == (0, 0.0)
 
 
-@pytest.mark.parametrize('batch', [1, 12, 500])
-def test_the_speed_is_that_of_the_last_fifth_of_a_second(batch):
+@pytest.mark.parametrize('size', [1, 12, 500])
+def test_the_speed_is_that_of_the_last_fifth_of_a_second(size):
     positions = along(np.where(np.arange(499) < 300, 0.5, 0.2))
-    speed = SpeedNow()
-    assert np.isnan(speed.m_per_s)
-    for start in range(0, 324, batch):
-        rows = slice(start, min(start + batch, 324))
-        speed.add(STAMPS_NS[rows], positions[rows])
+    poses, newest = batch(STAMPS_NS, positions=positions), NO_POSES
+    assert np.isnan(newest.speed_m_per_s)
+    for start in range(0, 324, size):
+        newest = newest_poses(newest, poses.select(slice(start, min(start + size, 324))))
     # 27 steps at the first speed, 23 at the second.
-    assert speed.m_per_s == pytest.approx((27 * 0.5 + 23 * 0.2) / 50, rel=1e-9)
-    speed.add(STAMPS_NS[:2], along(np.full(1, 0.3)))
-    assert speed.m_per_s == pytest.approx(0.3, rel=1e-9)
+    assert newest.speed_m_per_s == pytest.approx((27 * 0.5 + 23 * 0.2) / 50, rel=1e-9)
+    again = batch(STAMPS_NS[:2], positions=along(np.full(1, 0.3)))
+    assert newest_poses(newest, again).speed_m_per_s == pytest.approx(0.3, rel=1e-9)
 
 
 def test_shapes_must_match_and_flows_be_possible():
@@ -192,29 +192,3 @@ def test_shapes_must_match_and_flows_be_possible():
     for wrong in (-0.1, float('inf')):
         with pytest.raises(RecordingError, match='flow is'):
             relative_flow(True, wrong)
-
-
-def schedule(changes):
-    flow = FlowSchedule()
-    for stamp, value in changes:
-        flow.add(stamp, value)
-    return flow
-
-
-def flow_at(flow, stamps):
-    cuts, flows, _ = flow.steps()
-    return flows[np.searchsorted(cuts, stamps, side='right')]
-
-
-@given(
-    flows=st.dictionaries(st.integers(0, 50), st.sampled_from([0.0, 0.5, 1.0]), min_size=1),
-    order=st.randoms(use_true_random=False),
-    forgotten_until=st.integers(-5, 60),
-)
-def test_neither_order_nor_forgetting_matters_later(flows, order, forgotten_until):
-    expected, shuffled = schedule(sorted(flows.items())), list(flows.items())
-    order.shuffle(shuffled)
-    flow = schedule(shuffled)
-    flow.forget(forgotten_until)
-    later = np.arange(forgotten_until, 70)
-    assert np.array_equal(flow_at(flow, later), flow_at(expected, later))

@@ -138,7 +138,7 @@ def offline_um(
     path, _ = spray_path(
         trajectory, max_step_m=model.max_step_m, whole_strokes=model.needs_whole_strokes
     )
-    integrator = FilmIntegrator(node.points, model, precision, node.surface.occluder)
+    integrator = FilmIntegrator(node.points, model, precision, node.surface)
     integrator.add(path)
     return integrator.film_um
 

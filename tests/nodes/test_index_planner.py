@@ -51,7 +51,7 @@ def test_answer_is_the_recommendation_or_why_there_is_none(planner, ask, viewer,
         assert getattr(answer, name) == getattr(expected, name)
     assert list(answer.index_range_m) == [0.2, 0.8]
     assert list(answer.window_high_m) == [high for _, high in expected.windows_m]
-    assert list(answer.minima_index_m) == [m.index_m for m in expected.minima]
+    assert list(answer.minima_index_m) == [index_m for index_m, _ in expected.curve.minima]
     assert answer.travel == 'alternating'
     np.testing.assert_array_equal(answer.curve_sigma_n, expected.curve.sigma_n)
     assert answer.standoff_drift_low_m == expected.standoff_drift_m[0]

@@ -13,11 +13,6 @@ from paint_deposition.part.surface import Surface
 from surfaces import ball, cylinder, flat, fold, refined, triangulated
 
 
-def thin_plate(thickness_m=0.002):
-    plate = box((0.4, thickness_m, 0.4))
-    return Surface.from_triangles(plate.vertices, np.asarray(plate.faces), 0.02)
-
-
 def test_agrees_with_every_triangle_tried():
     surface = refined(lambda x, z: 0.05 * np.sin(20 * x) * np.cos(15 * z), 0.03, jitter=0.3)
     points = np.random.default_rng(1).uniform([-0.3, -0.2, -0.3], [0.3, 0.2, 0.3], (40, 3))
@@ -30,17 +25,15 @@ def test_agrees_with_every_triangle_tried():
         assert distance == pytest.approx(np.linalg.norm(nearest - point, axis=1).min())
 
 
-def test_the_side_that_the_normal_agrees_with_wins():
-    surface = thin_plate()
+def test_the_side_that_the_normal_agrees_with_wins_and_one_that_none_does_shows_in_the_angle():
+    plate = box((0.4, 0.002, 0.4))
+    surface = Surface.from_triangles(plate.vertices, np.asarray(plate.faces), 0.02)
     just_inside_the_front = np.array([[0.03, -0.0006, 0.02]])
     front = surface.at(just_inside_the_front, normals=[[0.0, -1.0, 0.0]])
     back = surface.at(just_inside_the_front, normals=[[0.1, 1.0, 0.0]])
     np.testing.assert_allclose(front.positions_m, [[0.03, -0.001, 0.02]], atol=1e-12)
     np.testing.assert_allclose(back.positions_m, [[0.03, 0.001, 0.02]], atol=1e-12)
     np.testing.assert_allclose(back.normals, [[0.0, 1.0, 0.0]], atol=1e-12)
-
-
-def test_a_normal_that_nothing_agrees_with_shows_in_the_angle():
     place = refined(flat, 0.05).locate([[0.0, 0.01, 0.0]], normals=[[0.0, 1.0, 0.0]])
     assert place.angle_rad[0] == pytest.approx(np.pi)
     assert place.distance_m[0] == pytest.approx(0.01)
@@ -77,26 +70,17 @@ def test_a_hood_lies_in_the_booth_and_its_front_is_below():
     assert downhill_axis(surface.outward, surface.down)[0] < -0.98
 
 
-def test_readings_see_the_covariates_of_the_vertices_they_lie_on():
+def test_readings_selections_and_other_processes_see_the_covariates_of_the_vertices():
     surface = refined(cylinder(-0.3), 0.04, 0.03)
     points, some = surface.points(), slice(None, None, 20)
+    covariates = 'curvature_per_m', 'edge_distance_m', 'sky_view_factor', 'height_fraction'
     at = surface.at(points.positions_m[some], points.normals[some])
-    for name in ('curvature_per_m', 'edge_distance_m', 'sky_view_factor', 'height_fraction'):
+    for name in covariates:
         np.testing.assert_allclose(getattr(at, name), getattr(points, name)[some], atol=1e-6)
-
-
-def test_a_selection_keeps_what_belongs_to_its_points():
-    points = refined(cylinder(-0.3), 0.05).points()
     chosen = points.select(points.positions_m[:, 2] > 0.1)
     rows = np.flatnonzero(points.positions_m[:, 2] > 0.1)
-    for name in ('positions_m', 'normals', 'area_m2', 'curvature_per_m', 'sky_view_factor',
-                 'edge_distance_m', 'height_fraction'):  # fmt: skip
+    for name in ('positions_m', 'normals', 'area_m2', *covariates):
         np.testing.assert_array_equal(getattr(chosen, name), getattr(points, name)[rows])
-
-
-def test_surface_and_points_go_to_other_processes():
-    surface = refined(cylinder(0.5), 0.05)
-    points = surface.points()
     again = pickle.loads(pickle.dumps(surface)).points()
     copied = pickle.loads(pickle.dumps(points))
     np.testing.assert_array_equal(copied.sky_view_factor, points.sky_view_factor)
@@ -116,38 +100,21 @@ def test_another_refinement_place_or_winding_is_another_mesh():
     assert len({surface.mesh_id for surface in (part, *others)}) == 4
 
 
-def normals_off_rad(surface, exact):
-    """Angle between the surface's normals and the exact ones at its vertices."""
-    wanted = exact(surface.vertices_m)
-    return np.linalg.norm(np.cross(surface.normals, wanted), axis=1)
-
-
-def ball_normals(radius_m):
-    """Outward normals of a ball whose foremost point is the origin."""
-
-    def exact(points):
-        way = points - np.array([0.0, radius_m, 0.0])
-        return way / np.linalg.norm(way, axis=1, keepdims=True)
-
-    return exact
-
-
-def test_a_plane_is_exact():
-    surface = refined(flat, 0.05, jitter=0.35)
-    np.testing.assert_allclose(surface.normals, np.tile([0.0, -1, 0], (len(surface.normals), 1)))
-
-
 @pytest.mark.parametrize(
     ('spacing_m', 'jitter', 'rms_deg'), [(0.01, 0.0, 0.001), (0.04, 0.35, 0.02), (0.1, 0.35, 0.2)]
 )
-def test_a_ball_up_to_the_rim(spacing_m, jitter, rms_deg):
+def test_the_normals_of_a_ball_are_right_up_to_its_rim(spacing_m, jitter, rms_deg):
     surface = refined(ball(0.8), spacing_m, half_width_m=0.4, jitter=jitter)
-    off = np.degrees(normals_off_rad(surface, ball_normals(0.8)))
+    exact = surface.vertices_m - np.array([0.0, 0.8, 0.0])  # from its centre
+    exact /= np.linalg.norm(exact, axis=1, keepdims=True)
+    off = np.degrees(np.linalg.norm(np.cross(surface.normals, exact), axis=1))
     assert np.sqrt(np.mean(off**2)) < rms_deg
     assert off.max() < 5 * rms_deg
 
 
-def test_a_box_keeps_its_edges_sharp():
+def test_a_plane_has_exact_normals_and_a_box_keeps_its_edges_sharp():
+    surface = refined(flat, 0.05, jitter=0.35)
+    np.testing.assert_allclose(surface.normals, np.tile([0.0, -1, 0], (len(surface.normals), 1)))
     body = box((0.3, 0.2, 0.1))
     surface = Surface.from_triangles(body.vertices, np.asarray(body.faces), 0.02)
     assert surface.area_m2 == pytest.approx(body.area)
@@ -156,21 +123,18 @@ def test_a_box_keeps_its_edges_sharp():
     assert (outward > 0.0).all()
 
 
-def well_inside(points, margin_m=0.04, half_width_m=0.2):
-    return np.abs(points.positions_m[:, [0, 2]]).max(axis=1) < half_width_m - margin_m
-
-
 @pytest.mark.parametrize(
     ('radius_m', 'spacing_m', 'jitter'), [(0.25, 0.01, 0.0), (2.0, 0.02, 0.3), (-0.3, 0.02, 0.3)]
 )
-def test_cylinder(radius_m, spacing_m, jitter):
+def test_the_curvature_of_a_cylinder(radius_m, spacing_m, jitter):
     points = refined(cylinder(radius_m), spacing_m, jitter=jitter).points()
-    inside = points.curvature_per_m[well_inside(points)]
-    np.testing.assert_allclose(inside, -1.0 / radius_m, rtol=0.02)
+    # Away from the rim by 40 mm.
+    inside = np.abs(points.positions_m[:, [0, 2]]).max(axis=1) < 0.16
+    np.testing.assert_allclose(points.curvature_per_m[inside], -1.0 / radius_m, rtol=0.02)
 
 
 @pytest.mark.parametrize('radius_m', [0.4, -0.5])
-def test_ball(radius_m):
+def test_the_curvature_of_a_ball(radius_m):
     points = refined(ball(radius_m), 0.012, jitter=0.2).points()
     np.testing.assert_allclose(points.curvature_per_m, -2.0 / radius_m, rtol=0.02)
 
@@ -202,19 +166,16 @@ def linear(points_m):
     return points_m @ np.array([3.0, -2.0, 5.0]) + 1.0
 
 
-def test_exact_for_linear_fields_on_a_standing_plane():
+def test_the_slope_is_exact_for_linear_fields_on_a_standing_plane_and_none_on_a_level_one():
     points = refined(flat, 0.03, jitter=0.3).points()
     np.testing.assert_allclose(points.slope_per_m @ linear(points.positions_m), -5.0)
-
-
-def test_level_surface_has_none():
     vertices, faces = triangulated(flat, 0.05)
     lying = vertices[:, [0, 2, 1]] * [1, 1, -1]
     points = Surface.from_triangles(lying, faces, 0.02, down=[0, 0, -1]).points()
     np.testing.assert_allclose(points.slope_per_m @ linear(points.positions_m), 0.0, atol=1e-9)
 
 
-def test_readings_get_the_slope_from_their_neighbours():
+def test_readings_get_the_slope_from_their_neighbours_and_a_one_sided_one_on_the_rim():
     surface = refined(cylinder(0.5), 0.01)
     readings = np.array([[0.0, 0.0, 0.02], [0.05, 0.01, -0.1], [-0.1, 0.0, 0.1]])
     points = surface.at(readings, stencil_m=0.006)
@@ -225,27 +186,19 @@ def test_readings_get_the_slope_from_their_neighbours():
     tilt = np.sqrt(1.0 - (z / 0.5) ** 2)
     np.testing.assert_allclose(slope[:3], -12.0 * np.cos(12.0 * z) * tilt**2, rtol=0.01)
     np.testing.assert_array_equal(slope[3:], 0.0)
+    rim = np.array([[0.0, 0.0, 0.2], [0.0, 0.0, -0.2]])
+    points = refined(flat, 0.05).at(rim, stencil_m=0.006)
+    slope = points.slope_per_m @ linear(points.positions_m)
+    np.testing.assert_allclose(slope[:2], -5.0)
 
 
-@pytest.mark.parametrize('z_m', [0.2, -0.2])
-def test_readings_on_the_rim_get_the_one_sided_slope(z_m):
-    points = refined(flat, 0.05).at(np.array([[0.0, 0.0, z_m]]), stencil_m=0.006)
-    assert (points.slope_per_m @ linear(points.positions_m))[0] == pytest.approx(-5.0)
-
-
-def test_a_sheet_has_its_rim():
+def test_a_sheet_has_its_rim_a_ball_none_and_a_closed_plate_ends_where_it_folds_back():
     points = refined(flat, 0.05, jitter=0.3).points()
     expected = 0.2 - np.abs(points.positions_m[:, [0, 2]]).max(axis=1)
     np.testing.assert_allclose(points.edge_distance_m, expected, atol=1e-9)
-
-
-def test_a_ball_has_none():
     ball = icosphere(subdivisions=3, radius=0.2)
     surface = Surface.from_triangles(ball.vertices, np.asarray(ball.faces), 0.05)
     assert np.isinf(surface.points().edge_distance_m).all()
-
-
-def test_a_closed_plate_ends_where_it_folds_back():
     plate = box((0.4, 0.003, 0.4))
     surface = Surface.from_triangles(plate.vertices, np.asarray(plate.faces), 0.02)
     middle = surface.at([[0.05, -0.0015, 0.0]], normals=[[0.0, -1.0, 0.0]])

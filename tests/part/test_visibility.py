@@ -7,6 +7,7 @@ from trimesh.util import concatenate
 
 from paint_deposition.part.points import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface, facing, toward_the_guns
+from paint_deposition.part.visibility import sees
 from surfaces import ball, flat, fold, refined, triangulated
 
 
@@ -15,7 +16,7 @@ def test_all_of_an_open_surface_is_seen_wherever_it_is(offset_m):
     vertices, faces = triangulated(ball(0.5), 0.02, jitter=0.3)
     surface = Surface.from_triangles(vertices + offset_m, faces, 0.02)
     eyes = np.array([[0.0, -0.3, 0.0], [0.3, -0.4, 0.2]]) + offset_m
-    seen = surface.occluder.sees(eyes[:, None], surface.vertices_m)
+    seen = sees(surface.obstacle, eyes[:, None], surface.vertices_m)
     assert seen.shape == (2, len(surface.vertices_m))
     assert seen.all()
 
@@ -27,7 +28,7 @@ def test_the_shadow_of_a_bar_ends_where_geometry_says():
     surface = Surface.from_triangles(both.vertices, np.asarray(both.faces), 0.05)
     z = np.linspace(-0.4, 0.4, 801)
     line = np.stack([0 * z, 0 * z, z], axis=1)
-    seen = surface.occluder.sees([0.0, -0.4, 0.0], line)
+    seen = sees(surface.obstacle, [0.0, -0.4, 0.0], line)
     # The bar's front corners, 0.19 m before the eye, cast the edge onto the wall 0.4 m before it.
     edge_m = 0.05 * 0.4 / 0.19
     clear = np.abs(np.abs(z) - edge_m) > 2e-3
@@ -112,10 +113,7 @@ X, Y, Z = np.eye(3)
 def test_across_is_to_the_right_of_the_gun_and_level(outward, across, downhill):
     np.testing.assert_allclose(across_axis(outward, -Z), across, atol=1e-12)
     np.testing.assert_allclose(downhill_axis(outward, -Z), downhill, atol=1e-12)
-
-
-def test_where_x_is_vertical_a_flat_part_takes_y():
-    np.testing.assert_allclose(across_axis(X, -X), Y, atol=1e-12)
+    np.testing.assert_allclose(across_axis(X, -X), Y, atol=1e-12)  # flat, where x is vertical
 
 
 EYES = np.array([[0.0, -0.25, 0.0], [0.1, -0.25, 0.1], [-0.1, -0.25, 0.0], [3.0, -0.25, 0.0]])

@@ -35,12 +35,12 @@ def sigma_n(model, index_m, **options):
 
 def test_every_local_minimum_is_found_and_the_deepest_recommended():
     answer = recommended()
-    assert [round(m.index_m, 2) for m in answer.minima] == [0.27, 0.58]
-    for minimum in answer.minima:
-        assert minimum.sigma_n == pytest.approx(sigma_n(SYMMETRIC, minimum.index_m), rel=1e-9)
+    assert [round(index_m, 2) for index_m, _ in answer.curve.minima] == [0.27, 0.58]
+    for index_m, least in answer.curve.minima:
+        assert least == pytest.approx(sigma_n(SYMMETRIC, index_m), rel=1e-9)
         for aside in (-1e-4, 1e-4):
-            assert minimum.sigma_n <= sigma_n(SYMMETRIC, minimum.index_m + aside)
-    assert answer.sigma_n == min(m.sigma_n for m in answer.minima)
+            assert least <= sigma_n(SYMMETRIC, index_m + aside)
+    assert answer.sigma_n == min(least for _, least in answer.curve.minima)
     assert answer.index_drift_m is None
 
 
@@ -50,7 +50,7 @@ def test_with_a_tolerance_the_best_index_of_the_widest_range_is_recommended():
     low, high = answer.windows_m[int(np.argmax(widths))]
     assert len(widths) == 2
     assert low <= answer.index_m <= high
-    assert answer.sigma_n == min(m.sigma_n for m in answer.minima if low <= m.index_m <= high)
+    assert answer.sigma_n == min(least for m, least in answer.curve.minima if low <= m <= high)
     for low, high in answer.windows_m:
         inside = np.linspace(low, high, 50)[1:-1]
         assert max(sigma_n(SYMMETRIC, index) for index in inside) <= 0.05

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from trimesh.creation import box
 
 import paint_deposition as pd
 from booth import panel, panel_with_screen, serpentine
@@ -62,11 +63,9 @@ def test_ends_of_a_slanted_part_follow_the_pass_and_impossible_parts_are_refused
     surface = sheet(lambda x, z: 0.0 * x)
     with pytest.raises(PlanError, match='no surface faces the gun'):
         SurfaceMap(surface, pass_axes(surface, outward=(0.0, 1.0, 0.0)), 0.1)
-    box = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
-    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-             [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
+    body = box()
     with pytest.raises(PlanError, match='closed'):
-        pass_axes(pd.Surface.from_triangles(box, np.array(faces), 0.5))
+        pass_axes(pd.Surface.from_triangles(body.vertices, np.asarray(body.faces), 0.5))
 
 
 STYLE = PassStyle(0.25, 0.3, acceleration_m_per_s2=2.0, overspray_m=0.2)
@@ -182,12 +181,13 @@ def test_a_screen_before_the_gun_is_met_while_it_passes_and_told_from_one_in_it(
 
 
 @pytest.mark.slow
-def test_a_plan_on_which_the_gun_touches_the_part_is_refused_or_says_so(tmp_path):
+def test_a_plan_on_which_the_gun_touches_the_part_is_refused_and_one_too_near_says_so(tmp_path):
     """The gun's body reaches back from the TCP, 30 mm from the panel: the screen is in its way."""
-    low = {'speed_m_per_s': 0.3, 'standoff_m': 0.03, 'smoothing_radius_m': 0.3}
-    with pytest.raises(PlanError, match=r'the gun touches the part at .* allow_contact keeps it'):
-        pd.plan(panel_with_screen(), **low)
-    kept = pd.plan(panel_with_screen(), allow_contact=True, **low)
-    touched, *_ = [line for line in kept.warnings if 'the gun touches the part' in line]
+    wanted = {'speed_m_per_s': 0.3, 'smoothing_radius_m': 0.3}
+    with pytest.raises(PlanError, match=r'the gun touches the part at .* give a greater standoff'):
+        pd.plan(panel_with_screen(), standoff_m=0.03, **wanted)
+    reaching = pd.GunEnvelope(radius_m=0.04, before_m=0.2)
+    kept = pd.plan(panel_with_screen(), envelope=reaching, **wanted)
+    near, *_ = [line for line in kept.warnings if 'the part is too near before the gun' in line]
     pd.write(kept, tmp_path)
-    assert f'! WARNING: {touched}' in (tmp_path / 'passes.mod').read_text()
+    assert f'! WARNING: {near}' in (tmp_path / 'passes.mod').read_text()

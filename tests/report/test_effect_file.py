@@ -174,7 +174,7 @@ def test_fitted_numbers_have_few_digits_and_give_the_fitted_film(file, fitted):
 
     def film_on_vertices_um(model: pd.DepositionModel) -> np.ndarray:
         surface = experiment.surface
-        integrator = FilmIntegrator(surface.points(), model, 'double', surface.occluder)
+        integrator = FilmIntegrator(surface.points(), model, 'double', surface)
         integrator.add(experiment.path)
         return integrator.gauge_um
 

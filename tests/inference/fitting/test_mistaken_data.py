@@ -11,7 +11,7 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.part.zones import PointZones, Zone
+from paint_deposition.part.zones import Zone
 
 pytestmark = pytest.mark.slow
 
@@ -154,8 +154,8 @@ def test_a_calibration_warns_of_the_unit_and_of_targets_far_away(panels):
     told = pd.Zones((Zone('rim', 20.0, 5.0, rim), Zone('rest', 1.0, 0.5, rest)))
     parts = []
     for part in panels.without(panels.readings.thickness_um < 3.0).experiments:
-        number = told.of(part.surface.vertices_m, part.surface.normals)
-        parts.append(replace(scaled(part, 10.0), zones=PointZones(told, number)))
+        zones = told.at(part.surface.vertices_m, part.surface.normals)
+        parts.append(replace(scaled(part, 10.0), zones=zones))
     unit, rim, rest, *_ = pd.calibrate(of(*parts)).warnings
     assert unit.startswith('the readings look ten times too large: they mean a film of ')
     assert unit.endswith('; divide them by 10')

@@ -19,7 +19,7 @@ from paint_deposition.motion.programmed import timed
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones, Zones
+from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.faces import PartPlan
 from paint_deposition.planning.faces import plan_faces as planned_faces
@@ -139,7 +139,7 @@ def plan_faces(
 
 def _with_zones(
     surface: Surface, zones: Zones | None, wanted: dict[str, Any]
-) -> tuple[PlanRequest, PointZones | None]:
+) -> tuple[PlanRequest, Zones | None]:
     """The request, and the zones of the vertices: their targets need speeds along the passes."""
     if zones is None:
         return PlanRequest(**wanted), None
@@ -153,7 +153,6 @@ def improve(
     model: DepositionModel | None = None,
     *,
     posterior: Posterior | None = None,
-    rivals: Sequence[DepositionModel] = (),
     target_region: np.ndarray | None = None,
     zones: Zones | None = None,
     robot: RobotCell | None = None,
@@ -168,7 +167,6 @@ def improve(
         trajectory: the programme, in the frame of the mesh.
         model: what the gun sprays; default: a 50 mm bell.
         posterior: what is known of the model; the film is made even over draws from it.
-        rivals: other models that explain the readings as well; each counts as much as the model.
         target_region: (V,) bool, vertices whose film counts; default: the side that the gun
             faces, where the programme lays more than a tenth of its greatest film.
         zones: regions with targets of their own, from ``read_zones``: the film over its own target
@@ -212,7 +210,7 @@ def improve(
     if sought.target_um is None:
         mean_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])
         sought = replace(sought, target_um=mean_um, elsewhere_um=mean_um)
-    models = [model, *rivals]
+    models = [model]
     if posterior is not None:
         models += draw_models(model, posterior, 8, seed)
     retiming = retime_for_evenness(surface, sought, original, models, request, progress)

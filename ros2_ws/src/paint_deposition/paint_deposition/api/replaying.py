@@ -105,7 +105,7 @@ class Replay:
         unpainted = []
         for motion, model in zip(self._motions, self._models, strict=True):
             film = LiveFilm(
-                self._points, model, occluder=self._surface.occluder, max_pose_gap_s=self._gap_s
+                self._points, model, occluder=self._surface, max_pose_gap_s=self._gap_s
             )
             # It knows when the gun will be switched, as it does offline.
             film.replay(events_of(motion, until=0))

@@ -206,7 +206,7 @@ def _painted(
         def report(done: int, before: int = before) -> None:
             progress('painting', (before + done) / steps)
 
-        integrators.append(FilmIntegrator(points, gun.model, precision, gun.surface.occluder))
+        integrators.append(FilmIntegrator(points, gun.model, precision, gun.surface))
         integrators[-1].add(gun.path, report)
         before += len(gun.path)
     return CommonFilm(tuple(integrators))

@@ -41,8 +41,8 @@ def recommend_command(
     results.write(answer, model=file.model, made_from=inputs(model_file=model_file))
     lines = [answer.sentence, f'SB50 of one pass: {1e3 * answer.sb50_m:.0f} mm']
     lines += (
-        f'minimum: sigma_n {100 * minimum.sigma_n:.2f} % at {1e3 * minimum.index_m:.0f} mm'
-        for minimum in answer.minima
+        f'minimum: sigma_n {100 * sigma_n:.2f} % at {1e3 * index_m:.0f} mm'
+        for index_m, sigma_n in answer.curve.minima
     )
     lines += (
         f'within tolerance: {1e3 * low:.0f} to {1e3 * high:.0f} mm'
@@ -174,10 +174,6 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
     help='The programme: a bag, a table of poses, or a RAPID module, taken as programmed.',
 )  # fmt: skip
 @options.model_option()
-@click.option(
-    '--rival', 'rivals', type=options.FILE, multiple=True,
-    help='Another model that explains the readings equally well; the film is optimised for all.',
-)  # fmt: skip
 @options_of(ImproveRequest)
 @options.seed_option('the models drawn from the posterior of the model file')
 @options.motion_options
@@ -190,7 +186,6 @@ def improve_command(
     part: Part,
     trajectory: Path,
     model_file: Path | None,
-    rivals: tuple[Path, ...],
     paint_moves: bool,
     seed: int,
     motion: dict[str, Any],
@@ -218,14 +213,13 @@ def improve_command(
         recorded = pd.read_recording(trajectory, **known)
         show('refining the mesh')
         result = pd.improve(
-            part.surface(), recorded, file.model, posterior=file.posterior,
-            rivals=[pd.read_model(path) for path in rivals], robot=cell, zones=part.zones(),
-            seed=seed, progress=show, **dict(request),
+            part.surface(), recorded, file.model, posterior=file.posterior, robot=cell,
+            zones=part.zones(), seed=seed, progress=show, **dict(request),
         )  # fmt: skip
         made_from = {
             **inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=file.path,
                      zones_file=part.zones_file),
-            'rivals': [str(path) for path in rivals], 'part_pose': part_pose,
+            'part_pose': part_pose,
         }  # fmt: skip
         show('writing and drawing')
         results.write(

@@ -21,7 +21,7 @@ from paint_deposition.cli.results import (
     zone_lines,
 )
 from paint_deposition.errors import RecordingError
-from paint_deposition.planning.requests import FilmBuild, MeasureRequest
+from paint_deposition.planning.requests import MeasureRequest, PlanRequest
 from paint_deposition.request import FilmBand, MotionOptions
 
 if TYPE_CHECKING:
@@ -253,18 +253,20 @@ def locate_command(touched: Path, points: Path, pose_unit: str | None, as_json: 
 @options.model_option()
 @options.BRUSH
 @options.options_of(MeasureRequest)
-@options.options_of(FilmBuild, into='passes')
+@options.option_of(PlanRequest, 'speed_m_per_s')
+@options.option_of(PlanRequest, 'target_um')
 @options.motion_options
 @options.MAX_POSE_GAP
 @options.ALLOW_EFFECTS
 @results_options('points.csv, poses.csv, points.png and measure.json')
 def measure_command(
     request: MeasureRequest,
-    passes: FilmBuild,
     part: options.Part,
     trajectory: Path | None,
     model_file: Path | None,
     brush: int,
+    speed_m_per_s: float | None,
+    target_um: float | None,
     motion: dict[str, Any],
     max_pose_gap_s: float,
     results: Results,
@@ -274,12 +276,12 @@ def measure_command(
     Fill the column thickness_um of points.csv and give that file as the measurements of a
     campaign.
     """
-    if trajectory is None and passes == FilmBuild():
+    if trajectory is None and speed_m_per_s is target_um is None:
         raise click.UsageError(
             'no motion is given; give --trajectory, or --target-um for passes '
             'as `plan` would lay them'
         )
-    if trajectory is not None and (brush or passes != FilmBuild()):
+    if trajectory is not None and (brush or speed_m_per_s or target_um):
         raise click.UsageError(
             '--target-um, --speed and --brush are of planned passes, --trajectory gives others; '
             'leave one of them out'
@@ -290,7 +292,10 @@ def measure_command(
         warnings: tuple[str, ...] = ()
         if trajectory is None:
             file, of_model = chosen_model(model_file, brush=brush)
-            recorded = pd.plan(surface, file.model, progress=show, **dict(passes)).trajectory
+            recorded = pd.plan(
+                surface, file.model, progress=show, speed_m_per_s=speed_m_per_s,
+                target_um=target_um,
+            ).trajectory  # fmt: skip
         else:
             file, of_model = model_for(model_file, trajectory)
             recorded = pd.read_recording(trajectory, **motion)

@@ -13,7 +13,6 @@ import numpy as np
 from paint_deposition.errors import MeshError, did_you_mean, some
 from paint_deposition.files.atomic import replacing, require_file
 from paint_deposition.part.edges import matched_half_edges, weld
-from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
 from paint_deposition.part.surface import Surface
 
@@ -103,7 +102,7 @@ def read_triangles(
         vertices = vertices.astype(np.float64) * scale
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
-    extent = float(box_extent_m(vertices if used.all() else vertices[used]).max())
+    extent = float(np.ptp(vertices if used.all() else vertices[used], axis=0).max())
     if not 0.005 <= extent <= LARGEST_M:
         found = f'only {extent * 1e3:.3g} mm large, it looks scaled down; use a larger '
         remedy = '--mesh-scale, or mesh_scale'

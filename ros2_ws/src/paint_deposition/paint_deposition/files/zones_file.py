@@ -10,7 +10,7 @@ from paint_deposition.errors import PaintError, quoted
 from paint_deposition.files.atomic import read_yaml
 from paint_deposition.files.meshes import read_triangles
 from paint_deposition.film.statistics import require_band
-from paint_deposition.part.zones import Patch, Zone, Zones
+from paint_deposition.part.zones import Zone, Zones
 from paint_deposition.request import Name, Number, Text, validate
 
 FACES = 'a list of numbers of triangles from 0, as 7, or of ranges, as 0-119'
@@ -90,17 +90,17 @@ def read_zones(
         if entry.name in [zone.name for zone in zones]:
             raise PaintError(f"{path}: two zones are called '{entry.name}'; rename one")
         try:
-            patch = _patch(path.parent, entry, Path(mesh), scale, body)
+            triangles_m = _triangles_m(path.parent, entry, Path(mesh), scale, body)
         except PaintError as error:
             raise type(error)(f"{path}: zone '{entry.name}': {error}") from None
         box_m = np.array(entry.box) if entry.box else None
-        zones.append(Zone(entry.name, entry.target_um, entry.tolerance_um, box_m, patch))
+        zones.append(Zone(entry.name, entry.target_um, entry.tolerance_um, box_m, triangles_m))
     return Zones(tuple(zones))
 
 
-def _patch(
+def _triangles_m(
     folder: Path, entry: ZoneEntry, part: Path, scale: float, body: str | None
-) -> Patch | None:
+) -> np.ndarray | None:
     if not (entry.mesh or entry.body or entry.faces):
         return None
     mesh = folder / entry.mesh if entry.mesh else part
@@ -117,4 +117,4 @@ def _patch(
             raise PaintError(f'faces: {mesh} has no triangle {most}, its last is {highest}')
         within = [(rows >= a) & (rows <= b) for a, b in entry.faces]
         faces = faces[np.logical_or.reduce(within)]
-    return Patch(vertices_m[faces])
+    return vertices_m[faces]

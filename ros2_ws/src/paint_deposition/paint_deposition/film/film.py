@@ -20,7 +20,7 @@ from paint_deposition.film.statistics import (
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 from paint_deposition.tabular import Tabular
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class Film(Tabular):
     paint: PaintUsed = field(default_factory=PaintUsed)
     doubts: tuple[str, ...] = ()
     coats: tuple[Film, ...] = ()
-    zones: PointZones | None = None
+    zones: Zones | None = None
     name: str = ''
 
     def __repr__(self) -> str:

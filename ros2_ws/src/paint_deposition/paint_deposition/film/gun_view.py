@@ -10,7 +10,7 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.points import box_extent_m, box_words
+from paint_deposition.part.points import box_words
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 
@@ -145,7 +145,7 @@ def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
 
 def _other_unit(view: GunView) -> str:
     part, way = (
-        float(np.linalg.norm(box_extent_m(positions)))
+        float(np.linalg.norm(np.ptp(positions, axis=0)))
         for positions in (view.surface.vertices_m, view.path.position_m)
     )
     nominal = view.model.projection.nominal_standoff_m

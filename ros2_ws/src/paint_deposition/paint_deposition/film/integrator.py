@@ -21,7 +21,8 @@ from paint_deposition.kernel.blocks import LARGEST_BLOCK, THREADS, shared_among_
 from paint_deposition.kernel.eq2_flux import CENTRE, REACH, RING, TERMS, Law, compile_kernel
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.visibility import Occluder
+from paint_deposition.part.surface import Surface
+from paint_deposition.part.visibility import Obstacle, horizon_sines, sees
 
 Precision = Literal['single', 'double']
 # Sub-steps handed to the kernel at once, so that long work can report progress.
@@ -49,7 +50,7 @@ class FilmIntegrator:
 
     Args:
         precision: 'single' for meshes (1e-6 of the peak), 'double' for fitting.
-        occluder: traces lines of sight; None where nothing can stand in the way.
+        occluder: the part that hides points from the gun; None where nothing can stand in the way.
         keep_absent_laws: compile the laws of absent effects too, so that a fit which varies them
             needs one kernel only; else an absent effect costs nothing.
         parallel: whether threads share the points; without, several integrators can paint at once.
@@ -60,7 +61,7 @@ class FilmIntegrator:
         points: SurfacePoints,
         model: DepositionModel,
         precision: Precision = 'single',
-        occluder: Occluder | None = None,
+        occluder: Surface | None = None,
         keep_absent_laws: bool = False,
         parallel: bool = True,
     ) -> None:
@@ -88,7 +89,7 @@ class FilmIntegrator:
                 self.points.positions_m[order],
                 self.points.normals[order],
             )
-            self._horizon = self._occluder.horizon_sines(self._positions_m, self._normals)
+            self._horizon = horizon_sines(self._occluder.tree, self._positions_m, self._normals)
         # Absent effects are left out rather than computed: they change nothing, to the bit.
         self._effects = [effect for effect in model.effects if not effect.is_neutral]
         compiled = model.effects if self._keep_absent_laws else self._effects
@@ -186,10 +187,10 @@ class FilmIntegrator:
             constants[:, REACH] = reach
         origins_m = layout.emission_points_m(self.model, path)
         constants = constants.astype(self._real)
-        return self._traced(self._occluder.sees, origins_m, rows, brush, constants)
+        return self._traced(self._occluder.obstacle, origins_m, rows, brush, constants)
 
     def _traced(
-        self, sees: Callable[[np.ndarray, np.ndarray], np.ndarray], origins_m: np.ndarray,
+        self, obstacle: Obstacle, origins_m: np.ndarray,
         rows: np.ndarray, brush: np.ndarray, constants: np.ndarray,
     ) -> Steps:  # fmt: skip
         """Trace rays from the first origin (M, 3) and then after every SIGHT_STEP_M of travel.
@@ -222,7 +223,7 @@ class FilmIntegrator:
                 self._horizon, traced, rows, begins, brush, constants,
                 which[some], block[some], starts[some],
             )  # fmt: skip
-            seen[places] = sees(traced[tracings], self._positions_m[points])
+            seen[places] = sees(obstacle, traced[tracings], self._positions_m[points])
 
         # RAYS_AT_ONCE or a little more in each.
         parts = np.cumsum(sizes) // layout.RAYS_AT_ONCE

@@ -27,7 +27,7 @@ from paint_deposition.motion.trajectory import (
     Trajectory,
 )
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.visibility import Occluder
+from paint_deposition.part.surface import Surface
 
 # A trigger change that is older than the newest pose by more is from a restarted stream, and none
 # is told so long ahead of its pose [ns].
@@ -63,7 +63,7 @@ class LiveFilm:
         model: DepositionModel,
         *,
         precision: Precision = 'single',
-        occluder: Occluder | None = None,
+        occluder: Surface | None = None,
         max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
         trigger_latency_s: float = 0.1,
         pose_memory: int = DEFAULT_POSE_MEMORY,

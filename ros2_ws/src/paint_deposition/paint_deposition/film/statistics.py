@@ -14,7 +14,7 @@ from paint_deposition.errors import PaintError
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import ONLY_BRUSH
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 
 # Thinner film counts as bare metal: overspray dust that no gauge shows.
 DEFAULT_PAINTED_ABOVE_UM = 1.0
@@ -97,7 +97,7 @@ def film_statistics(
     painted_above_um: float = DEFAULT_PAINTED_ABOVE_UM,
     target_um: float = 0.0,
     target_tolerance_um: float = 0.0,
-    zones: PointZones | None = None,
+    zones: Zones | None = None,
 ) -> FilmStatistics:
     """Sum up a film (V,) [um] by the area (V,) that each vertex stands for; 1 um on 1 m2 is 1 cm3.
 
@@ -155,7 +155,7 @@ def film_statistics(
 
 
 def wanted_at(
-    film_um: np.ndarray, target_um: float, tolerance_um: float, zones: PointZones | None
+    film_um: np.ndarray, target_um: float, tolerance_um: float, zones: Zones | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Target and tolerance (V,) [um] for a film (V,); NaN where no film is wanted."""
     if zones:

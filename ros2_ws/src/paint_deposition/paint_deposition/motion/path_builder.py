@@ -4,8 +4,10 @@ Of a recorded motion it is said what is wrong with it: nothing moves or sprays, 
 begins again.
 """
 
+from bisect import bisect_right, insort
 from collections.abc import Iterator
 from itertools import pairwise
+from operator import itemgetter
 from typing import NoReturn
 
 import numpy as np
@@ -16,15 +18,16 @@ from paint_deposition.motion.path import SprayPath, split_segments, thin_poses
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen, TriggerChange, events_of
 from paint_deposition.motion.stream_quality import MANY_REPEATED
 from paint_deposition.motion.trajectory import (
+    BEFORE_ALL_NS,
     DEFAULT_MAX_POSE_GAP_S,
     ONLY_BRUSH,
-    FlowSchedule,
     PoseCounts,
     Trajectory,
     gap_ns,
 )
 
 DEFAULT_MAX_STEP_M = 0.008
+_STAMP = itemgetter(0)
 
 
 class PathBuilder:
@@ -51,7 +54,10 @@ class PathBuilder:
         self.max_step_m = max_step_m
         self.whole_strokes = whole_strokes
         self.screen = PoseScreen(self.max_gap_ns)
-        self._flow = FlowSchedule()
+        # Stamp, flow and brush of changes of the trigger, in order; and of those that may belong
+        # to a stream that is about to restart.
+        self._changes: list[tuple[int, float, int]] = []
+        self._waiting_changes: list[tuple[int, float, int]] = []
         self._waiting: list[PoseBatch] = []
         self._integrated_ns: int | None = None
         # The stream has not restarted once its stamps are beyond; see ``add_trigger``.
@@ -66,10 +72,11 @@ class PathBuilder:
     def add_trigger(self, stamp_ns: int, flow: float, brush: int = ONLY_BRUSH) -> None:
         """Change the flow (relative; 0 is gun off) and the brush at a time.
 
-        Before the first change the gun is off; without any it always sprays. A change that comes
-        after the path beyond it was handed out is counted and takes effect from there on. One
-        from before the newest pose by more than a gap waits as long, and the path with it: it is
-        a late one if the stream goes on, and one of the restarted stream if that comes.
+        Before the first change the gun is off; without any it always sprays. Of two at one time
+        the later to come counts. A change that comes after the path beyond it was handed out is
+        counted and takes effect from there on. One from before the newest pose by more than a gap
+        waits as long, and the path with it: it is a late one if the stream goes on, and one of
+        the restarted stream if that comes.
         """
         newest_ns = self.screen.newest_ns
         newest_ns = int(stamp_ns) if newest_ns is None else newest_ns
@@ -78,7 +85,8 @@ class PathBuilder:
             self._restart_until_ns = newest_ns + self.max_gap_ns
         elif self._integrated_ns is not None:
             self.screen.counts.late_triggers += int(stamp_ns) < self._integrated_ns
-        self._flow.add(stamp_ns, flow, brush, another_stream=waits)
+        change = int(stamp_ns), float(flow), int(brush) if flow > 0.0 else ONLY_BRUSH
+        insort(self._waiting_changes if waits else self._changes, change, key=_STAMP)
 
     def add_poses(self, batch: PoseBatch) -> None:
         """Take poses."""
@@ -88,18 +96,18 @@ class PathBuilder:
             self._stream_ns = int(continued.stamps_ns[0])
         if len(continued) and continued.stamps_ns[-1] > self._restart_until_ns:
             # The stream has not restarted: changes that waited for that are of this one.
-            waited = self._flow.go_on()
-            if self._integrated_ns is not None:
-                self.screen.counts.late_triggers += sum(
-                    stamp < self._integrated_ns for stamp in waited
-                )
+            for change in self._waiting_changes:
+                insort(self._changes, change, key=_STAMP)
+                is_late = self._integrated_ns is not None and change[0] < self._integrated_ns
+                self.screen.counts.late_triggers += is_late
+            self._waiting_changes = []
         for stream in restarted:
             ended_ns = int(PoseBatch.joined(self._waiting).stamps_ns[-1])
             within = self._stream_ns is not None and stream.stamps_ns[0] > self._stream_ns
             self._stream_ns = int(stream.stamps_ns[0])
             self._cut_segments(until_ns=None, finish=True)
             if not self._knows_all_changes:
-                self._flow.restart(ended_ns if within else None)
+                self._restart_trigger(ended_ns if within else None)
             self._integrated_ns = self._began_ns = None
             self._gap_before_next = True
             self._waiting = [stream]
@@ -114,8 +122,9 @@ class PathBuilder:
         if finish:
             self.screen.finish()
         self._cut_segments(until_ns, finish)
-        if self._integrated_ns is not None:
-            self._flow.forget(self._integrated_ns)
+        if self._integrated_ns is not None:  # of the changes until there the last still counts
+            passed = bisect_right(self._changes, self._integrated_ns, key=_STAMP)
+            del self._changes[: max(passed - 1, 0)]
         path = SprayPath.joined([SprayPath.empty(), *self._finished])
         self._finished = []
         if not (self.whole_strokes and len(path)):
@@ -131,14 +140,40 @@ class PathBuilder:
         self._finished = [path.select(slice(ready, None))]
         return complete.select(slice(0, ready))
 
+    def _trigger_steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times (C,) int64 of changes; flow and brush (C + 1,) before, between and after them."""
+        if not self._changes:
+            return np.empty(0, dtype=np.int64), np.ones(1), np.array([ONLY_BRUSH])
+        last_at = {stamp: (flow, brush) for stamp, flow, brush in self._changes}
+        stamps, set_to = np.array([*last_at], np.int64), [(0.0, ONLY_BRUSH), *last_at.values()]
+        flows, brushes = np.array([f for f, _ in set_to]), np.array([b for _, b in set_to])
+        changes = (np.diff(flows) != 0.0) | (np.diff(brushes) != 0)
+        kept = np.append(True, changes)
+        return stamps[changes], flows[kept], brushes[kept]
+
+    def _restart_trigger(self, ended_ns: int | None) -> None:
+        """Go over to a restarted stream, and the changes that waited for it.
+
+        Until the first of them the gun stays as it was when the stream before ended, at
+        ``ended_ns``, if the clock was set back in its midst; None: a replay, off until then.
+        """
+        if self._changes:
+            passed = 0
+            if ended_ns is not None:
+                passed = bisect_right(self._changes, ended_ns, key=_STAMP)
+            _, flow, brush = self._changes[passed - 1] if passed else (0, 0.0, ONLY_BRUSH)
+            self._waiting_changes.insert(0, (BEFORE_ALL_NS, flow, brush))
+        self._changes, self._waiting_changes = self._waiting_changes, []
+
     def _cut_segments(self, until_ns: int | None, finish: bool) -> None:
         if not self._waiting:
             return
         poses = PoseBatch.joined(self._waiting)
         self._waiting = [poses]
         ready = len(poses)
-        if self._flow.waiting and not finish:
-            until_ns = min(self._flow.waiting[0], until_ns or self._flow.waiting[0])
+        if self._waiting_changes and not finish:
+            first_ns = self._waiting_changes[0][0]
+            until_ns = min(first_ns, until_ns or first_ns)
         if until_ns is not None:
             ready = int(np.searchsorted(poses.stamps_ns, until_ns, side='right'))
         if ready < 2:
@@ -152,7 +187,7 @@ class PathBuilder:
             rows = np.append(rows, ready - 1)
         if len(rows) < 2:
             return
-        cuts, flows, brushes = self._flow.steps()
+        cuts, flows, brushes = self._trigger_steps()
         now = come.select(rows)
         stamp, dwell, position, rotation, velocity, after_gap = split_segments(
             now.stamps_ns, now.positions_m, now.quaternions_xyzw, cuts, self.max_gap_ns,
@@ -175,7 +210,7 @@ class PathBuilder:
     def _with_strokes_and_passes(self, path: SprayPath, after_gap: np.ndarray) -> SprayPath:
         """The path with its strokes and passes, and what lies behind each sub-step."""
         if self._states is None:
-            flow_before = float(self._flow.steps()[1][0])
+            flow_before = float(self._trigger_steps()[1][0])
             self._states = strokes.first_states(flow_before)
             after_gap[0] = False  # Nothing came before the first.
         of_stroke, of_pass, of_trigger = self._states

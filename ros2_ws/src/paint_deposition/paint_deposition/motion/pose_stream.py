@@ -1,5 +1,6 @@
 """A stream of poses and trigger changes: which can be followed, and a log to follow it again."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -70,8 +71,25 @@ class PoseBatch:
         columns = zip(*(vars(batch).values() for batch in batches), strict=True)
         return PoseBatch(*map(np.concatenate, columns))
 
+    @property
+    def speed_m_per_s(self) -> float:
+        """Way of the TCP over time [m/s]; NaN while there are no two times."""
+        if len(self) < 2 or self.stamps_ns[-1] <= self.stamps_ns[0]:
+            return math.nan
+        way_m = np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1).sum()
+        return float(way_m / (1e-9 * (self.stamps_ns[-1] - self.stamps_ns[0])))
+
 
 NO_POSES = PoseBatch(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 4)))
+
+
+def newest_poses(before: PoseBatch, poses: PoseBatch) -> PoseBatch:
+    """Those of the last 0.2 s after some more; stamps that go back begin anew."""
+    if not len(before) or poses.stamps_ns[0] > before.stamps_ns[-1]:
+        poses = PoseBatch.joined([before, poses])
+    # Single steps carry the noise of the encoders and the jitter of the stamps.
+    recent = np.flatnonzero(poses.stamps_ns >= poses.stamps_ns[-1] - 200_000_000)
+    return poses.select(recent[-2000:])
 
 
 def events_of(
@@ -110,55 +128,29 @@ class MotionLog:
         self.pose_memory = pose_memory
         self.poses = self.changes = 0
         self.complete = True
-        # With room for more than came.
-        self._kept = NO_POSES
-        # With the number of poses that came before.
-        self._changes: list[tuple[int, TriggerChange]] = []
+        self._events: list[TriggerChange | PoseBatch] = []
 
     def add(self, event: TriggerChange | PoseBatch) -> None:
         """Note what came."""
-        if not self.complete:
+        poses, changes = (0, 1) if isinstance(event, TriggerChange) else (len(event), 0)
+        if not self.complete or self.poses + self.changes + poses + changes > self.pose_memory:
+            self.complete, self._events = False, []
             return
-        size = 1 if isinstance(event, TriggerChange) else len(event)
-        if self.poses + self.changes + size > self.pose_memory:
-            self.complete = False
-            self._kept, self._changes, self.changes = NO_POSES, [], 0
-        elif isinstance(event, TriggerChange):
-            self._changes.append((self.poses, event))
-            self.changes += 1
-            return
-        else:
-            end = self.poses + len(event)
-            if end > len(self._kept):  # readers go on with the old one
-                rows = np.arange(2 * end) % max(len(self._kept), 1)
-                self._kept = (self._kept if self.poses else event).select(rows)
-            for kept, new in zip(vars(self._kept).values(), vars(event).values(), strict=True):
-                kept[self.poses : end] = new
-        self.poses += len(event) if isinstance(event, PoseBatch) else 0
+        self._events.append(event)
+        self.poses += poses
+        self.changes += changes
 
     def events(self, poses: int = 0, changes: int = 0) -> Iterator[TriggerChange | PoseBatch]:
         """What came until now, after so many poses and changes."""
-        end, kept = self.poses, self._kept  # in this order: what is kept may grow meanwhile
-        if not self.complete:
-            return
-        for before, change in self._changes[changes:]:
-            if before > end:
-                break
-            yield from _rows(kept, poses, before)
-            yield change
-            poses = before
-        yield from _rows(kept, poses, end)
-
-    def first_poses(self, count: int) -> PoseBatch | None:
-        """The first poses that are kept, ``count`` if there are so many."""
-        batches = list(_rows(self._kept, 0, min(count, self.poses if self.complete else 0)))
-        return PoseBatch.joined(batches) if batches else None
-
-
-def _rows(kept: PoseBatch, start: int, stop: int) -> Iterator[PoseBatch]:
-    """The poses of this range."""
-    for row in range(start, stop, BATCH_POSES):
-        yield kept.select(slice(row, min(row + BATCH_POSES, stop)))
+        for event in [*self._events]:  # more may come meanwhile
+            if isinstance(event, TriggerChange):
+                if changes <= 0:
+                    yield event
+                changes -= 1
+            else:
+                for row in range(max(poses, 0), len(event), BATCH_POSES):
+                    yield event.select(slice(row, row + BATCH_POSES))
+                poses -= len(event)
 
 
 # A number beyond this is damage too, and its square must be one in single precision [m].

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered
+from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory
 from paint_deposition.motion.transforms import POSE_FORMAT, is_pose
 
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
@@ -99,7 +99,7 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
         np.array([round(time_s * 1e9) for time_s in times_s]), np.array(positions),
         np.array(quaternions), trigger_stamps_ns=np.array([*gun], dtype=np.int64),
         trigger_flow=np.array([flow for flow, _ in gun.values()]),
-        trigger_brush=numbered([brush for _, brush in gun.values()]),
+        trigger_brush=np.array([brush for _, brush in gun.values()], np.int64),
     )  # fmt: skip
 
 

@@ -1,6 +1,5 @@
 """Whether a recorded stream of samples will do: rate, gaps, repeats, lag, unit and speed."""
 
-import math
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -67,31 +66,6 @@ class StreamSteps:
         self.jumps += int(np.count_nonzero(far))
         fastest = step_m[far] / step_s[far]
         self.fastest_m_per_s = float(np.max(fastest, initial=self.fastest_m_per_s))
-
-
-class SpeedNow:
-    """The speed over the last 0.2 s of a stream of poses."""
-
-    def __init__(self) -> None:
-        self._stamps_ns: np.ndarray = np.empty(0, dtype=np.int64)
-        self._positions_m: np.ndarray = np.empty((0, 3))
-
-    def add(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
-        """Take stamps (N,) int64 and positions (N, 3) [m]; stamps that go back begin anew."""
-        if not len(self._stamps_ns) or stamps_ns[0] > self._stamps_ns[-1]:
-            stamps_ns = np.concatenate([self._stamps_ns, stamps_ns])
-            positions_m = np.concatenate([self._positions_m, positions_m])
-        # Single steps carry the noise of the encoders and the jitter of the stamps.
-        recent = np.flatnonzero(stamps_ns >= stamps_ns[-1] - 200_000_000)[-2000:]
-        self._stamps_ns, self._positions_m = stamps_ns[recent], positions_m[recent]
-
-    @property
-    def m_per_s(self) -> float:
-        """Way over time [m/s]; NaN while there are no two times."""
-        if len(self._stamps_ns) < 2 or self._stamps_ns[-1] <= self._stamps_ns[0]:
-            return math.nan
-        way_m = np.linalg.norm(np.diff(self._positions_m, axis=0), axis=1).sum()
-        return float(way_m / (1e-9 * (self._stamps_ns[-1] - self._stamps_ns[0])))
 
 
 class RepeatedSamples:

@@ -1,10 +1,8 @@
 """A recorded motion of the atomizer: poses, and the trigger with flow and brush over time."""
 
 import math
-from bisect import bisect_right, insort
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from operator import itemgetter
 
 import numpy as np
 
@@ -33,75 +31,6 @@ def relative_flow(spraying: bool, flow: float = math.nan) -> float:
     if flow < 0.0 or math.isinf(flow):
         raise RecordingError(f'atomizer flow is {flow}: give 1 for the calibrated flow, or NaN')
     return float(flow)
-
-
-_STAMP = itemgetter(0)
-
-
-class FlowSchedule:
-    """Flow relative to the calibrated one, and the brush, as functions of time.
-
-    Before the first change the gun is off; without any change it always sprays.
-    """
-
-    def __init__(self) -> None:
-        self._changes: list[tuple[int, float, int]] = []
-        self._of_another_stream: list[tuple[int, float, int]] = []
-
-    def add(
-        self, stamp_ns: int, flow: float, brush: int = ONLY_BRUSH, another_stream: bool = False
-    ) -> None:
-        """Set flow (relative; 0 is gun off) and brush from a time on.
-
-        Of two changes at one time the later to come counts. ``another_stream``: the change waits,
-        since it may belong to a stream that is about to restart.
-        """
-        change = (int(stamp_ns), float(flow), int(brush) if flow > 0.0 else ONLY_BRUSH)
-        insort(self._of_another_stream if another_stream else self._changes, change, key=_STAMP)
-
-    def steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Times (C,) int64 of changes; flow and brush (C + 1,) before, between and after them."""
-        if not self._changes:
-            return np.empty(0, dtype=np.int64), np.ones(1), np.array([ONLY_BRUSH])
-        last_at = {stamp: (flow, brush) for stamp, flow, brush in self._changes}
-        stamps, set_to = np.array([*last_at], np.int64), [(0.0, ONLY_BRUSH), *last_at.values()]
-        flows, brushes = np.array([f for f, _ in set_to]), np.array([b for _, b in set_to])
-        changes = (np.diff(flows) != 0.0) | (np.diff(brushes) != 0)
-        kept = np.append(True, changes)
-        return stamps[changes], flows[kept], brushes[kept]
-
-    def forget(self, until_ns: int) -> None:
-        """Drop changes that no longer matter from a time on."""
-        superseded = bisect_right(self._changes, until_ns, key=_STAMP) - 1
-        if superseded > 0:
-            del self._changes[:superseded]
-
-    @property
-    def waiting(self) -> list[int]:
-        """Times of the changes that wait, in order."""
-        return [stamp for stamp, *_ in self._of_another_stream]
-
-    def go_on(self) -> list[int]:
-        """The stream has not restarted: changes that waited are of this one; their times."""
-        stamps, late = self.waiting, self._of_another_stream
-        self._of_another_stream = []
-        for change in late:
-            insort(self._changes, change, key=_STAMP)
-        return stamps
-
-    def restart(self, ended_ns: int | None) -> None:
-        """Go over to a restarted stream, and the changes that waited for it.
-
-        Until the first of them the gun stays as it was when the stream before ended, at
-        ``ended_ns``, if the clock was set back in its midst; None: a replay, off until then.
-        """
-        early, self._of_another_stream = self._of_another_stream, []
-        if not self._changes:
-            self._changes = early
-            return
-        passed = bisect_right(self._changes, ended_ns, key=_STAMP) if ended_ns is not None else 0
-        _, flow, brush = self._changes[passed - 1] if passed else (0, 0.0, ONLY_BRUSH)
-        self._changes = [(BEFORE_ALL_NS, flow, brush), *early]
 
 
 @dataclass
@@ -135,12 +64,6 @@ class PoseCounts:
     def to_dict(self) -> dict[str, int]:
         """All counts by name, for diagnostics and statistics."""
         return asdict(self) | {'rejected': self.rejected}
-
-
-def numbered(brushes: Sequence[int] | np.ndarray) -> np.ndarray:
-    """(M,) int64 numbers of brushes, none of them where all are the only one."""
-    numbers = np.array(brushes, dtype=np.int64)
-    return numbers if np.any(numbers != ONLY_BRUSH) else numbers[:0]
 
 
 @dataclass(frozen=True)

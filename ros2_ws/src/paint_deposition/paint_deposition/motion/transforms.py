@@ -5,6 +5,7 @@ Frames follow the rules of tf2, live and from a recording.
 
 import math
 from bisect import bisect_left, bisect_right
+from collections import ChainMap
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.motion.path import write_rotation
 from paint_deposition.motion.trajectory import Trajectory
 
 # RAPID writes quaternions with four digits; further off is damage, not rounding.
@@ -47,13 +49,8 @@ class Rigid:
         """From [x y z qx qy qz qw]; the quaternion is normalised."""
         quaternion = np.asarray(values[3:], dtype=float)
         x, y, z, w = (quaternion / np.linalg.norm(quaternion)).tolist()
-        rotation = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        rotation = np.empty((3, 3))
+        write_rotation(rotation, (x, y, z, w))
         return Rigid(rotation, (x, y, z, w), np.asarray(values[:3], dtype=float))
 
     def inverse(self) -> 'Rigid':
@@ -147,7 +144,7 @@ class FrameTree:
         self._fixed: dict[str, tuple[str, Rigid]] = {}
         self._placed: dict[str, tuple[str, Rigid]] = {}
         # Both, the user's in the place of the others.
-        self._still: dict[str, tuple[str, Rigid]] = {}
+        self._still = ChainMap(self._placed, self._fixed)
         # Stamp, parent and pose of each frame over time, in order; and of a live one that the
         # last transform was far behind.
         self._moving: dict[str, list[tuple[int, str, np.ndarray]]] = {}
@@ -167,7 +164,6 @@ class FrameTree:
         if self._has_room(child):
             self._lasting.clear()
             self._fixed[_name(child)] = _name(parent), Rigid.of(pose)
-            self._still = self._fixed | self._placed
 
     def place(self, child: str, parent: str, pose: Sequence[float]) -> None:
         """Say where a frame is, whatever transforms say of it; no pose: they say it again."""
@@ -175,7 +171,6 @@ class FrameTree:
         self._placed.pop(_name(child), None)
         if len(pose):
             self._placed[_name(child)] = _name(parent), Rigid.of(pose)
-        self._still = self._fixed | self._placed
 
     def add(self, child: str, parent: str, stamp_ns: int, pose: Sequence[float]) -> bool:
         """Take a transform at one time.
@@ -278,10 +273,9 @@ class FrameTree:
         """The pose of the first frame of a chain in the parent of the last."""
         still = self._still
         steps = [
-            still[frame][1] if frame in still
-            else self._pose_at(frame, stamp_ns)
+            still[frame][1] if frame in still else self._pose_at(frame, stamp_ns)
             for frame in chain
-        ]  # fmt: skip
+        ]
         return reduce(matmul, reversed(steps)) if steps else None
 
     def _pose_at(self, frame: str, stamp_ns: int) -> Rigid:

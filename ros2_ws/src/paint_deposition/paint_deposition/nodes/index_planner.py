@@ -135,14 +135,14 @@ class IndexPlanner(PaintNode):
         response.message = '; '.join([answer.sentence, *answer.notes])
         for name in ('index_m', 'sigma_n', 'mean_um', 'speed_m_per_s', 'travel'):
             setattr(response, name, getattr(answer, name))
-        for name in ('tolerance', 'cycle_time_s'):
-            value = getattr(answer, name)
+        known = {'tolerance': index_request.tolerance, 'cycle_time_s': answer.cycle_time_s}
+        for name, value in known.items():
             setattr(response, name, math.nan if value is None else value)
         response.index_range_m = list(answer.index_range_m)
         response.window_low_m = [low for low, _ in answer.windows_m]
         response.window_high_m = [high for _, high in answer.windows_m]
-        response.minima_index_m = [minimum.index_m for minimum in answer.minima]
-        response.minima_sigma_n = [minimum.sigma_n for minimum in answer.minima]
+        response.minima_index_m = [index_m for index_m, _ in answer.curve.minima]
+        response.minima_sigma_n = [sigma_n for _, sigma_n in answer.curve.minima]
         response.passes = answer.passes or 0
         response.curve_index_m = answer.curve.index_m.tolist()
         response.curve_sigma_n = answer.curve.sigma_n.tolist()

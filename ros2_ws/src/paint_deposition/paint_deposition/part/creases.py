@@ -99,29 +99,23 @@ def split_at_creases(faces: np.ndarray, smooth: np.ndarray) -> tuple[np.ndarray,
 
 
 def strip_vertices(
-    vertices_m: np.ndarray, patches: np.ndarray, hem_half_edges: np.ndarray
-) -> np.ndarray:
-    """(V,) bool: vertices of patches (F, 3) so narrow that they belong to a hem.
+    corners_m: np.ndarray, patches: np.ndarray, hem_half_edges: np.ndarray, fine: np.ndarray,
+    count: int,
+) -> np.ndarray:  # fmt: skip
+    """(count,) bool: vertices of patches (F, 3) so narrow that they belong to a hem.
 
-    No two smooth patches share vertices; of each fold of a hem both half-edges are given.
+    No two smooth patches share vertices; of each fold of a hem both half-edges are given. The
+    vertices are those of the refined triangles ``fine``, the corners before all others.
     """
     if not len(hem_half_edges):
-        return np.zeros(len(vertices_m), dtype=bool)
-    _, patch = connected(patches, len(vertices_m))
-    length_m = edge_lengths_m(vertices_m, patches).ravel()[hem_half_edges]
-    of_face = patch[patches[:, 0]]
-    border = np.bincount(of_face[hem_half_edges // 3], length_m, minlength=patch.max() + 1)
-    area = np.bincount(of_face, face_areas_m2(vertices_m, patches), minlength=patch.max() + 1)
-    # A strip has a fold on both its sides, and is no wider than this between them [m].
-    return (2.0 * area < 0.02 * border)[patch]
-
-
-def carried_over(flagged: np.ndarray, fine: np.ndarray, count: int) -> np.ndarray:
-    """(count,) bool: the flag of patches' first vertices, for all vertices of the refined ones."""
-    if not flagged.any():
         return np.zeros(count, dtype=bool)
     _, patch = connected(fine, count)
-    return np.bincount(patch[: len(flagged)], flagged, minlength=patch.max() + 1)[patch] > 0
+    length_m = edge_lengths_m(corners_m, patches).ravel()[hem_half_edges]
+    of_face = patch[patches[:, 0]]
+    border = np.bincount(of_face[hem_half_edges // 3], length_m, minlength=patch.max() + 1)
+    area = np.bincount(of_face, face_areas_m2(corners_m, patches), minlength=patch.max() + 1)
+    # A strip has a fold on both its sides, and is no wider than this between them [m].
+    return (2.0 * area < 0.02 * border)[patch]
 
 
 @dataclass(frozen=True)

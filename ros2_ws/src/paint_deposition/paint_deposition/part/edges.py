@@ -92,31 +92,16 @@ def half_edges_m(vertices_m: np.ndarray, faces: np.ndarray, half_edges: np.ndarr
     return vertices_m[np.stack([corners[half_edges], corners[next_half_edge(half_edges)]], axis=1)]
 
 
-@njit(cache=True, nogil=True)
-def connected(rows, count):
+def connected(rows: np.ndarray, count: int) -> tuple[int, np.ndarray]:
     """How many groups of ``count`` members rows (P, K) make, and (count,) the group of each.
 
     Members in one row, the ends of an edge or the corners of a face, are of one group. Groups are
     numbered in the order of their first members.
     """
-    # Members hang from the first of all that they are joined to.
-    parents = np.arange(count).astype(np.int32)
-    for row in rows:
-        for k in range(1, len(row)):
-            one, other = row[0], row[k]
-            while parents[one] != one:
-                parents[one] = parents[parents[one]]
-                one = parents[one]
-            while parents[other] != other:
-                parents[other] = parents[parents[other]]
-                other = parents[other]
-            parents[max(one, other)] = min(one, other)
-    groups, group = 0, np.empty(count, dtype=np.int64)
-    for member in range(count):
-        # A parent comes before its children.
-        group[member] = groups if parents[member] == member else group[parents[member]]
-        groups += parents[member] == member
-    return groups, group
+    joined = np.repeat(rows[:, 0], rows.shape[1] - 1), rows[:, 1:].ravel()
+    links = scipy.sparse.coo_array((np.ones(len(joined[0]), bool), joined), shape=(count, count))
+    groups, group = scipy.sparse.csgraph.connected_components(links, directed=False)
+    return groups, group.astype(np.int64)
 
 
 def near_pairs(

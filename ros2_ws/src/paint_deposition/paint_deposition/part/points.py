@@ -124,10 +124,22 @@ class SurfacePoints:
         area_m2: (V,) surface that each point stands for, or None for gauge readings.
         neighbours: (V,) the points in the order of ``kernel.blocks.neighbours_together``; default:
             they are sorted when they are painted.
-        curvature_per_m, edge_distance_m, sky_view_factor, height_fraction, slope_per_m: see the
-            properties; arrays or functions without arguments that return them. Default: flat,
-            without edges, all sky, over the points themselves, without neighbours.
+        covariates: those below; arrays or functions without arguments that return them. Default:
+            flat, without edges, all sky, over the points themselves, without neighbours.
     """
+
+    # (V,) k1 + k2 [1/m], positive where the surface is concave toward the gun.
+    curvature_per_m: np.ndarray
+    # (V,) distance to the nearest free edge [m], inf where the part has none.
+    edge_distance_m: np.ndarray
+    # (V,) cosine-weighted share of the hemisphere over the point that is not hidden.
+    sky_view_factor: np.ndarray
+    # (V,) 0 at the lowest point of the part to 1 at its highest.
+    height_fraction: np.ndarray
+    # (V, V) sparse derivative along gravity's component in the surface [1/m]: on surface that
+    # leans by an angle a from the horizontal ``points.slope_per_m @ field`` is sin(a) times the
+    # field's change per metre. Rows of points without neighbours are zero.
+    slope_per_m: scipy.sparse.csr_matrix
 
     def __init__(
         self,
@@ -149,7 +161,10 @@ class SurfacePoints:
             outward = outward_side(self.normals, area_m2, self.down)
         self.outward = outward
         self.centre_m = box_centre_m(self.positions_m) if centre_m is None else centre_m
-        self.extent_m = box_extent_m(self.positions_m) if extent_m is None else extent_m
+        if extent_m is None:
+            low, high = bounding_box_m(self.positions_m)
+            extent_m = high - low
+        self.extent_m = extent_m
         self.area_m2 = area_m2
         self._neighbours = neighbours
         self._blocks: dict[type, Blocks] = {}
@@ -166,6 +181,14 @@ class SurfacePoints:
                             f'{", ".join(self._covariates)}')  # fmt: skip
         self._covariates |= {k: v for k, v in covariates.items() if v is not None}
 
+    def __getattr__(self, name: str) -> Any:
+        """A covariate that is used for the first time."""
+        if name.startswith('_') or name not in self._covariates:
+            raise AttributeError(f'points have no {name}')
+        value = self._covariates[name]
+        vars(self)[name] = value() if callable(value) else value
+        return vars(self)[name]
+
     def __len__(self) -> int:
         return len(self.positions_m)
 
@@ -179,38 +202,8 @@ class SurfacePoints:
 
     def __getstate__(self) -> dict:
         """Covariates are computed before points go to another process."""
-        for name in self._covariates:
-            self._covariate(name)
-        return self.__dict__ | {'_blocks': {}}
-
-    @property
-    def curvature_per_m(self) -> np.ndarray:
-        """(V,) k1 + k2 [1/m], positive where the surface is concave toward the gun."""
-        return self._covariate('curvature_per_m')
-
-    @property
-    def edge_distance_m(self) -> np.ndarray:
-        """(V,) distance to the nearest free edge [m], inf where the part has none."""
-        return self._covariate('edge_distance_m')
-
-    @property
-    def sky_view_factor(self) -> np.ndarray:
-        """(V,) cosine-weighted share of the hemisphere over the point that is not hidden."""
-        return self._covariate('sky_view_factor')
-
-    @property
-    def height_fraction(self) -> np.ndarray:
-        """(V,) 0 at the lowest point of the part to 1 at its highest."""
-        return self._covariate('height_fraction')
-
-    @property
-    def slope_per_m(self) -> scipy.sparse.csr_matrix:
-        """(V, V) sparse derivative along gravity's component in the surface [1/m].
-
-        On surface that leans by an angle a from the horizontal ``points.slope_per_m @ field`` is
-        sin(a) times the field's change per metre. Rows of points without neighbours are zero.
-        """
-        return self._covariate('slope_per_m')
+        computed = {name: getattr(self, name) for name in self._covariates}
+        return self.__dict__ | {'_covariates': computed, '_blocks': {}}
 
     def select(self, rows: np.ndarray | slice | list[int]) -> 'SurfacePoints':
         """The chosen rows (mask, slice or indices), covariates computed only if used.
@@ -218,29 +211,24 @@ class SurfacePoints:
         Slopes need neighbours: a row some of whose neighbours are not chosen has slope zero.
         """
         rows = np.arange(len(self))[rows]
+
+        def slopes_among() -> scipy.sparse.csr_matrix:
+            whole = self.slope_per_m[rows]
+            inside = whole[:, rows]
+            complete = np.diff(whole.indptr) == np.diff(inside.indptr)
+            inside.data *= np.repeat(complete, np.diff(inside.indptr))
+            inside.eliminate_zeros()
+            return inside
+
         kept: dict[str, Any] = {
-            name: lambda name=name: self._covariate(name)[rows]
-            for name in self._covariates
-            if name != 'slope_per_m'
+            name: lambda name=name: getattr(self, name)[rows] for name in self._covariates
         }
         return SurfacePoints(
             self.positions_m[rows], self.normals[rows], down=self.down, outward=self.outward,
             centre_m=self.centre_m, extent_m=self.extent_m,
             area_m2=None if self.area_m2 is None else self.area_m2[rows],
-            slope_per_m=lambda: _slope_among(self.slope_per_m, rows), **kept,
+            **kept | {'slope_per_m': slopes_among},
         )  # fmt: skip
-
-    def _covariate(self, name: str) -> Any:
-        value = self._covariates[name]
-        if callable(value):
-            value = self._covariates[name] = value()
-        return value
-
-
-def box_extent_m(positions_m: np.ndarray) -> np.ndarray:
-    """(3,) sides of the bounding box of (V, 3) points [m]."""
-    low, high = bounding_box_m(positions_m)
-    return high - low
 
 
 def box_words(positions_m: np.ndarray) -> str:
@@ -255,12 +243,3 @@ def heights(positions_m: np.ndarray, among_m: np.ndarray, down: np.ndarray) -> n
     height, others = -positions_m @ down, -among_m @ down
     extent = np.ptp(others) if len(others) else 0.0
     return (height - others.min()) / extent if extent else np.zeros(len(height))
-
-
-def _slope_among(slope: scipy.sparse.csr_matrix, rows: np.ndarray) -> scipy.sparse.csr_matrix:
-    whole = slope[rows]
-    inside = whole[:, rows]
-    complete = np.diff(whole.indptr) == np.diff(inside.indptr)
-    inside.data *= np.repeat(complete, np.diff(inside.indptr))
-    inside.eliminate_zeros()
-    return inside

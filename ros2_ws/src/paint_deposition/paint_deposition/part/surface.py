@@ -26,14 +26,13 @@ from paint_deposition.part.points import (
     CANCELLED,
     ONE_SIDED,
     SurfacePoints,
-    box_extent_m,
     gravity,
     heights,
     mean_normal,
     outward_side,
 )
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, face_normals, refine
-from paint_deposition.part.visibility import Occluder
+from paint_deposition.part.visibility import Obstacle, obstacle_of, sky_view_factor
 
 
 @dataclass(frozen=True)
@@ -107,10 +106,10 @@ class Surface:
         single_m = half_edges_m(vertices_m, faces, single)
         folded_m = half_edges_m(vertices_m, faces, paired[rim, 0])
         rim_m = np.concatenate([without_seams(single_m), folded_m])
-        strip = creases.strip_vertices(vertices_m[origin], patches, paired[rim].ravel())
         corners = vertices_m[origin]
         read_normals = derivatives.surface_normals(corners, patches)
         unjoined = paired[~smooth, 1], clashing.ravel(), single
+        hem = paired[rim].ravel()
         half_edges = np.concatenate([paired[:, 0], *unjoined])
         curved_edges = CurvedEdges.of(corners, read_normals, patches, half_edges)
         del paired, folds, half_edges, unjoined  # large ones, before the next are made
@@ -123,7 +122,7 @@ class Surface:
         down = np.asarray(down, dtype=np.float64)
         return Surface(
             vertices, fine, normals, vertex_areas, down / np.linalg.norm(down), rim_m, notes,
-            in_hem=creases.carried_over(strip, fine, len(vertices)),
+            in_hem=creases.strip_vertices(corners, patches, hem, fine, len(vertices)),
             curved_edges=curved_edges, neighbours=neighbours_together(vertices),
         )  # fmt: skip
 
@@ -149,13 +148,18 @@ class Surface:
         return box_centre_m(self.vertices_m)
 
     @cached_property
-    def occluder(self) -> Occluder:
+    def tree(self) -> FaceTree:
+        """The triangles, sorted for rays and searches."""
+        return FaceTree.of(self.vertices_m, self.faces)
+
+    @cached_property
+    def obstacle(self) -> Obstacle:
         """The part as an obstacle to rays."""
-        return Occluder(lambda: self._tree)
+        return obstacle_of(self.tree)
 
     def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(N,) the triangle that each ray meets first, from either side, -1 for none."""
-        tree, met = self._tree, np.empty(len(starts_m), dtype=np.int64)
+        tree, met = self.tree, np.empty(len(starts_m), dtype=np.int64)
         starts = np.ascontiguousarray(starts_m, dtype=np.float64)
         ways = np.ascontiguousarray(directions, dtype=np.float64)
 
@@ -187,7 +191,7 @@ class Surface:
         # A gun whose mean direction is shorter has turned to more sides of the part than one.
         one_side = self.gun_side is not None and np.linalg.norm(self.gun_side) >= 0.9
         side = self.outward if one_side else None
-        return locate(self._tree, self.normals, points_m, normals, side)
+        return locate(self.tree, self.normals, points_m, normals, side)
 
     def at(
         self,
@@ -224,16 +228,14 @@ class Surface:
             'down': self.down,
             'outward': self.outward,
             'centre_m': self.centre_m,
-            'extent_m': box_extent_m(self.vertices_m),
+            'extent_m': np.ptp(self.vertices_m, axis=0),
             'curvature_per_m': lambda: self._curvature_per_m(positions_m, normals),
             'edge_distance_m': lambda: edge_distance_m(positions_m, self.rim_m),
-            'sky_view_factor': lambda: self.occluder.sky_view_factor(positions_m, normals),
+            'sky_view_factor': lambda: sky_view_factor(
+                self.tree, self.obstacle, positions_m, normals
+            ),
             'height_fraction': lambda: heights(positions_m, self.vertices_m, self.down),
         }
-
-    @cached_property
-    def _tree(self) -> FaceTree:
-        return FaceTree.of(self.vertices_m, self.faces)
 
     @cached_property
     def longest_edge_m(self) -> float:
@@ -286,7 +288,7 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
     known = replace(surface, gun_side=gun_side)
     # What rays and searches need is shared.
     made = vars(surface).items()
-    vars(known).update({key: value for key, value in made if key in ('_tree', 'occluder')})
+    vars(known).update({key: value for key, value in made if key in ('tree', 'obstacle')})
     settled = surface.gun_side is not None and np.array_equal(known.outward, surface.outward)
     return surface if settled else known
 

@@ -1,9 +1,7 @@
 """What the part hides: lines of sight, the horizon around a point, and its share of the sky."""
 
 import math
-from collections.abc import Callable
 from functools import partial
-from threading import Lock
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
@@ -120,97 +118,89 @@ SKY_RAYS = AZIMUTHS * ELEVATIONS
 BEYOND_THE_PART_M = 1e3
 
 
-class Occluder:
-    """The part as an obstacle to rays; ``tree`` gives that of its faces with the first ray."""
+# A scene, the point (3,) that its coordinates are relative to [m], and its mesh, which the scene
+# does not keep alive by itself.
+Obstacle = tuple[EmbreeScene, np.ndarray, TriangleMesh]
 
-    def __init__(self, tree: Callable[[], FaceTree]) -> None:
-        self._tree = tree
-        self._building = Lock()
-        self._built: tuple[EmbreeScene, np.ndarray, TriangleMesh] | None = None
 
-    @property
-    def _scene(self) -> tuple[EmbreeScene, np.ndarray]:
-        """The scene, and the point (3,) that its coordinates are relative to [m].
+def obstacle_of(tree: FaceTree) -> Obstacle:
+    """The faces for Embree, which takes a second for a million of them."""
+    scene, origin_m = EmbreeScene(robust=True), box_centre_m(tree.vertices_m)
+    # Embree works in single precision: coordinates are kept small.
+    corners = (tree.vertices_m - origin_m).astype(np.float32)
+    return scene, origin_m, TriangleMesh(scene, corners, tree.faces.astype(np.int32))
 
-        Made with the first ray, for all threads: it takes a second for a million triangles.
-        """
-        with self._building:
-            if self._built is None:
-                scene, tree = EmbreeScene(robust=True), self._tree()
-                # Embree works in single precision: coordinates are kept small.
-                origin_m = box_centre_m(tree.vertices_m)
-                corners = (tree.vertices_m - origin_m).astype(np.float32)
-                # The scene does not keep the mesh alive by itself.
-                mesh = TriangleMesh(scene, corners, tree.faces.astype(np.int32))
-                self._built = scene, origin_m, mesh
-            return self._built[:2]
 
-    def sees(self, eyes_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
-        """(...,) bool: whether nothing of the part lies between (..., 3) eyes and points on it.
+def sees(obstacle: Obstacle, eyes_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
+    """(...,) bool: whether nothing of the part lies between (..., 3) eyes and points on it.
 
-        A point's own surroundings within CLEARANCE_M do not hide it, nor does surface that is seen
-        from behind: incidence is the projection's business.
-        """
-        eyes, points = np.broadcast_arrays(eyes_m, points_m)
-        way = points - eyes
-        length = np.linalg.norm(way, axis=-1)
-        direction = way / np.maximum(length, 1e-12)[..., None]
-        blocked = self._blocked(
-            eyes.reshape(-1, 3), direction.reshape(-1, 3), length.ravel() - CLEARANCE_M
-        )
-        return ~blocked.reshape(length.shape)
+    A point's own surroundings within CLEARANCE_M do not hide it, nor does surface that is seen
+    from behind: incidence is the projection's business.
+    """
+    eyes, points = np.broadcast_arrays(eyes_m, points_m)
+    way = points - eyes
+    length = np.linalg.norm(way, axis=-1)
+    direction = way / np.maximum(length, 1e-12)[..., None]
+    blocked = _blocked(
+        obstacle, eyes.reshape(-1, 3), direction.reshape(-1, 3), length.ravel() - CLEARANCE_M
+    )
+    return ~blocked.reshape(length.shape)
 
-    def horizon_sines(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """(N,) sine of the highest elevation at which a point sees any of the part.
 
-        Elevations are those over the plane at right angles to the point's normal (N, 3). A ray
-        that comes to the point from higher up meets nothing on its way. No less than LEAST_SINE,
-        and 1 where it is above HIGH_SINE.
-        """
-        tree, found = self._tree(), np.empty(len(points_m))
-        points = np.ascontiguousarray(points_m, dtype=np.float64)
-        upward = np.ascontiguousarray(normals, dtype=np.float64)
+def horizon_sines(tree: FaceTree, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(N,) sine of the highest elevation at which a point sees any of the part.
 
-        fill = partial(_fill, points, upward, tree.vertices_m, tree.faces, tree.nodes, found)
-        shared_among_threads(len(points), fill)
-        return found
+    Elevations are those over the plane at right angles to the point's normal (N, 3). A ray
+    that comes to the point from higher up meets nothing on its way. No less than LEAST_SINE,
+    and 1 where it is above HIGH_SINE.
+    """
+    found, points = np.empty(len(points_m)), np.ascontiguousarray(points_m, dtype=np.float64)
+    upward = np.ascontiguousarray(normals, dtype=np.float64)
 
-    def sky_view_factor(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """(N,) cosine-weighted share of the hemisphere over each point that the part leaves free.
+    fill = partial(_fill, points, upward, tree.vertices_m, tree.faces, tree.nodes, found)
+    shared_among_threads(len(points), fill)
+    return found
 
-        1 on flat and convex surface. The fixed set of SKY_RAYS directions resolves 0.002 where
-        only the lowest sky is hidden, as in the shallow recesses of a door.
-        """
-        # Directions (3, SKY_RAYS) about +z. The sky below elevation e has weight sin(e)^2; with
-        # t = sin(e) in equal strata rays lie close together near the horizon, where they are
-        # needed. Strata are shifted from azimuth to azimuth.
-        azimuth, stratum = np.divmod(np.arange(SKY_RAYS), ELEVATIONS)
-        t = (stratum + 0.5 * (np.sqrt(5.0) - 1.0) * azimuth % 1.0) / ELEVATIONS
-        angle, across = 2.0 * np.pi * (azimuth + 0.5) / AZIMUTHS, np.sqrt(1.0 - t**2)
-        sky, weights = np.stack([across * np.cos(angle), across * np.sin(angle), t]), t / t.sum()
-        horizon = self.horizon_sines(points_m, normals)
-        open_share = np.empty(len(points_m))
-        rows = 1_000_000 // SKY_RAYS
-        for start in range(0, len(points_m), rows):
-            part = slice(start, start + rows)
-            up = normals[part]
-            frame = np.stack([*tangents(up), up])
-            point, ray = np.nonzero(sky[2] <= horizon[part, None])
-            direction = np.einsum('kr,kri->ri', sky[:, ray], frame[:, point])
-            starts = points_m[part][point] + LIFT_M * up[point]
-            blocked = self._blocked(starts, direction, np.full(len(starts), BEYOND_THE_PART_M))
-            hidden = np.bincount(point, blocked * weights[ray], minlength=len(up))
-            open_share[part] = 1.0 - hidden
-        return open_share
 
-    def _blocked(
-        self, starts_m: np.ndarray, directions: np.ndarray, lengths_m: np.ndarray
-    ) -> np.ndarray:
-        scene, origin_m = self._scene
-        hits = scene.run(
-            (starts_m - origin_m).astype(np.float32),
-            directions.astype(np.float32),
-            dists=np.maximum(lengths_m, 0.0).astype(np.float32),
-            query='OCCLUDED',
-        )
-        return hits >= 0
+def sky_view_factor(
+    tree: FaceTree, obstacle: Obstacle, points_m: np.ndarray, normals: np.ndarray
+) -> np.ndarray:
+    """(N,) cosine-weighted share of the hemisphere over each point that the part leaves free.
+
+    1 on flat and convex surface. The fixed set of SKY_RAYS directions resolves 0.002 where
+    only the lowest sky is hidden, as in the shallow recesses of a door.
+    """
+    # Directions (3, SKY_RAYS) about +z. The sky below elevation e has weight sin(e)^2; with
+    # t = sin(e) in equal strata rays lie close together near the horizon, where they are
+    # needed. Strata are shifted from azimuth to azimuth.
+    azimuth, stratum = np.divmod(np.arange(SKY_RAYS), ELEVATIONS)
+    t = (stratum + 0.5 * (np.sqrt(5.0) - 1.0) * azimuth % 1.0) / ELEVATIONS
+    angle, across = 2.0 * np.pi * (azimuth + 0.5) / AZIMUTHS, np.sqrt(1.0 - t**2)
+    sky, weights = np.stack([across * np.cos(angle), across * np.sin(angle), t]), t / t.sum()
+    horizon = horizon_sines(tree, points_m, normals)
+    open_share = np.empty(len(points_m))
+    rows = 1_000_000 // SKY_RAYS
+    for start in range(0, len(points_m), rows):
+        part = slice(start, start + rows)
+        up = normals[part]
+        frame = np.stack([*tangents(up), up])
+        point, ray = np.nonzero(sky[2] <= horizon[part, None])
+        direction = np.einsum('kr,kri->ri', sky[:, ray], frame[:, point])
+        starts = points_m[part][point] + LIFT_M * up[point]
+        blocked = _blocked(obstacle, starts, direction, np.full(len(starts), BEYOND_THE_PART_M))
+        hidden = np.bincount(point, blocked * weights[ray], minlength=len(up))
+        open_share[part] = 1.0 - hidden
+    return open_share
+
+
+def _blocked(
+    obstacle: Obstacle, starts_m: np.ndarray, directions: np.ndarray, lengths_m: np.ndarray
+) -> np.ndarray:
+    scene, origin_m, _ = obstacle
+    hits = scene.run(
+        (starts_m - origin_m).astype(np.float32),
+        directions.astype(np.float32),
+        dists=np.maximum(lengths_m, 0.0).astype(np.float32),
+        query='OCCLUDED',
+    )
+    return hits >= 0

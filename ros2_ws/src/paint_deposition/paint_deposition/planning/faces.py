@@ -22,7 +22,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 from paint_deposition.planning.passes import PlannedPass, plan_passes, planned_moves, trajectory_of
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.planned_film import (
@@ -85,7 +85,7 @@ def plan_faces(
     widest_rad: float = WIDEST_RAD,
     envelope: GunEnvelope | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
-    zones: PointZones | None = None,
+    zones: Zones | None = None,
 ) -> PartPlan:
     """Split a part into faces, plan each, blend them, and order them for least travel.
 
@@ -163,7 +163,7 @@ def _blended(
     area_m2 = np.where(wanted.region, surface.vertex_areas_m2, 0.0)
     weight = area_m2 / area_m2.sum()
     target = request.target_um if request.speed_m_per_s is None else None
-    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    integrator = FilmIntegrator(surface.points(), model, occluder=surface)
     overspray_m, unblended, tried = 0.0, math.nan, []
     # Margins along the seams, as shares of the overspray.
     shares = (0.0, 0.35, 0.7, 1.0) if len(faces) > 1 else (0.0,)

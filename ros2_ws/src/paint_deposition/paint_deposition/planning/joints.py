@@ -28,14 +28,12 @@ MARGIN = 0.03
 Start = tuple[np.ndarray, float]
 
 
-def starts(
-    arm: Arm, position_m: np.ndarray, axes: np.ndarray, free_roll: bool, seed: int = 0
-) -> list[Start]:
+def starts(arm: Arm, position_m: np.ndarray, axes: np.ndarray, free_roll: bool) -> list[Start]:
     """Configurations that reach a pose, the farthest from the limits first.
 
     With ``free_roll`` the tool is turned about its own axis by any angle.
     """
-    rng, count = np.random.default_rng(seed), 600
+    rng, count = np.random.default_rng(0), 600
     # A joint without limits begins within pi of zero [rad or m].
     lower = np.where(np.isfinite(arm.lower), arm.lower, -np.pi)
     upper = np.where(np.isfinite(arm.upper), arm.upper, np.pi)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
-from scipy.sparse import csr_matrix
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
@@ -56,18 +55,6 @@ class Nodes:
         first, last = np.searchsorted(self.opening, [opening, opening + 1])
         return slice(int(first), int(last))
 
-    def hats(self, travel_m: np.ndarray, opening: np.ndarray) -> csr_matrix:
-        """(M, n) weights of the nodes at places (M,) within or beyond openings (M,)."""
-        ends = np.array([[one.on_m, one.off_m] for one in self.openings])[opening]
-        inside = np.clip(travel_m, *ends.T)
-        return BSpline.design_matrix(inside, np.pad(self.travel_m, 1, 'edge'), 1)
-
-    def elapsed_s(self, number: int, slowness: np.ndarray, travel_m: np.ndarray) -> np.ndarray:
-        """Time from the begin of an opening to places (M,) in it, for slowness (n,) [s/m]."""
-        rows = self.rows(number)
-        line = make_interp_spline(self.travel_m[rows], slowness[rows], k=1)
-        return line.antiderivative()(travel_m)
-
 
 def retime(
     programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: ImproveRequest
@@ -99,10 +86,10 @@ def retime(
     outside = moving & (square > 0.0)
     duration[outside] = length[outside] / np.sqrt(square[outside])
     for number, (on, off) in enumerate(ends):
-        inside = (middle > on) & (middle < off)
-        duration[inside] = nodes.elapsed_s(number, slowness, end[inside]) - nodes.elapsed_s(
-            number, slowness, begin[inside]
-        )
+        inside, rows = (middle > on) & (middle < off), nodes.rows(number)
+        line = make_interp_spline(nodes.travel_m[rows], slowness[rows], k=1)
+        since_on_s = line.antiderivative()
+        duration[inside] = since_on_s(end[inside]) - since_on_s(begin[inside])
     # Poses that are reached in less than this [s] are left out: the gun stood there and does so no
     # more.
     kept = np.append(True, duration > 1e-5)
@@ -171,7 +158,7 @@ class FilmAtPoints:
         self.model, self._share = model, share
         self._surface, self._rows = surface, rows
         points = surface.points().select(rows)
-        self._integrator = FilmIntegrator(points, model, occluder=surface.occluder)
+        self._integrator = FilmIntegrator(points, model, occluder=surface)
         narrow = min(min(p.sigma1_m, p.sigma2_m) for p in model.patterns)
         self.step_m = max(model.max_step_m, narrow / 6.0)
 
@@ -192,7 +179,10 @@ class FilmAtPoints:
         # The opening that each sub-step belongs to: the last that has begun.
         begun = np.searchsorted(programme.ends_m[:, 0], travel, side='right')
         sprayed, rows = self._integrator.sprayed(path)
-        hats = nodes.hats(travel[rows], np.maximum(begun - 1, 0)[rows])
+        ends = np.array([[one.on_m, one.off_m] for one in nodes.openings])
+        inside = np.clip(travel[rows], *ends[np.maximum(begun - 1, 0)[rows]].T)
+        # (M, n) weights of the nodes at the sub-steps.
+        hats = BSpline.design_matrix(inside, np.pad(nodes.travel_m, 1, 'edge'), 1)
         shares = hats.multiply(1.0 / (hats @ density)[:, np.newaxis]).tocsc()
         films = np.empty((len(nodes), len(self._rows)))
         for node in range(len(nodes)):
@@ -208,6 +198,6 @@ class FilmAtPoints:
         if not any(effect.acts('on_film') for effect in self.model.effects):
             return 1.0
         surface = self._surface
-        whole = FilmIntegrator(surface.points(), self.model, occluder=surface.occluder)
+        whole = FilmIntegrator(surface.points(), self.model, occluder=surface)
         raw = whole.raw_of(path)
         return np.divide(whole.film_um, raw, out=np.ones(len(raw)), where=raw > 0.0)[self._rows]

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.motion.programmed import Move
-from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered
+from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory
 from paint_deposition.planning.sides import SurfaceMap
 
 WAYPOINT_STEP_M = 0.01
@@ -136,7 +136,7 @@ def trajectory_of(
         frame_id=frame_id,
         trigger_stamps_ns=np.round(np.array(triggers) * 1e9).astype(np.int64),
         trigger_flow=np.tile([1.0, 0.0], len(passes)),
-        trigger_brush=numbered([planned.style.brush for planned in passes for _ in range(2)]),
+        trigger_brush=np.repeat([planned.style.brush for planned in passes], 2),
     )
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -75,21 +76,14 @@ def passes_to_cover(parallel: ParallelPasses, index_m: float, width_m: float) ->
 
 
 @dataclass(frozen=True)
-class Minimum:
-    """A local minimum of sigma_n."""
-
-    index_m: float
-    sigma_n: float
-
-
-@dataclass(frozen=True)
 class IndexCurve:
     """sigma_n over the index of parallel passes."""
 
     parallel: ParallelPasses  # the passes
     index_m: np.ndarray  # (N,) increasing [m]
     sigma_n: np.ndarray  # (N,)
-    minima: tuple[Minimum, ...]  # refined local minima inside the range, by index
+    # Refined local minima inside the range, by index [m], each with its sigma_n.
+    minima: tuple[tuple[float, float], ...]
 
     @staticmethod
     def of(parallel: ParallelPasses, low_m: float, high_m: float) -> 'IndexCurve':
@@ -106,19 +100,19 @@ class IndexCurve:
             )
             for k in inside
         ]  # fmt: skip
-        minima = tuple(Minimum(float(found.x), float(found.fun)) for found in refined)
+        minima = tuple((float(found.x), float(found.fun)) for found in refined)
         return IndexCurve(parallel, index, sigma, minima)
 
     @property
-    def best_end(self) -> Minimum:
-        """The more even end of the range."""
+    def best_end(self) -> tuple[float, float]:
+        """The more even end of the range [m], and sigma_n there."""
         end = 0 if self.sigma_n[0] <= self.sigma_n[-1] else -1
-        return Minimum(float(self.index_m[end]), float(self.sigma_n[end]))
+        return float(self.index_m[end]), float(self.sigma_n[end])
 
     def windows_m(self, tolerance: float) -> list[tuple[float, float]]:
         """Intervals of the index in the range within which sigma_n keeps to the tolerance."""
         knots = [*zip(self.index_m.tolist(), self.sigma_n.tolist(), strict=True)]
-        knots = sorted(knots + [(m.index_m, m.sigma_n) for m in self.minima])
+        knots = sorted([*knots, *self.minima])
 
         def above(index_m: float) -> float:
             return self.parallel.sigma_n(index_m) - tolerance
@@ -135,28 +129,28 @@ class IndexCurve:
         return list(zip(ends[::2], ends[1::2], strict=True))
 
 
-def choose_index(curve: IndexCurve, tolerance: float | None) -> Minimum:
-    """The index to recommend, see ``recommend``.
+def choose_index(curve: IndexCurve, tolerance: float | None) -> tuple[float, float]:
+    """The index to recommend [m], see ``recommend``, and sigma_n there.
 
     Raises:
         PlanError: nothing in the range keeps to the tolerance; names what comes closest.
     """
     minima = curve.minima
     if tolerance is None:
-        return min(minima, key=lambda m: m.sigma_n) if minima else curve.best_end
+        return min(minima, key=itemgetter(1)) if minima else curve.best_end
     windows = curve.windows_m(tolerance)
     if not windows:
-        closest = min([*minima, curve.best_end], key=lambda m: m.sigma_n)
+        index_m, sigma_n = min([*minima, curve.best_end], key=itemgetter(1))
         raise PlanError(
             f'no index from {curve.index_m[0]:g} to {curve.index_m[-1]:g} m keeps sigma_n within '
-            f'{100 * tolerance:g} %; the closest is {100 * closest.sigma_n:.2f} % at '
-            f'{closest.index_m:.3f} m: allow that much (tolerance {1.01 * closest.sigma_n:.2g}), '
+            f'{100 * tolerance:g} %; the closest is {100 * sigma_n:.2f} % at '
+            f'{index_m:.3f} m: allow that much (tolerance {1.01 * sigma_n:.2g}), '
             'or search a smaller index'
         )
     low, high = max(windows, key=lambda window: window[1] - window[0])
-    ends = [Minimum(end, curve.parallel.sigma_n(end)) for end in (low, high)]
-    found = [m for m in minima if low <= m.index_m <= high] or ends
-    return min(found, key=lambda m: m.sigma_n)
+    ends = [(end, curve.parallel.sigma_n(end)) for end in (low, high)]
+    found = [minimum for minimum in minima if low <= minimum[0] <= high] or ends
+    return min(found, key=itemgetter(1))
 
 
 class LineFilms:

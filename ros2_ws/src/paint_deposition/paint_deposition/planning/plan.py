@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.passes import (
     WAYPOINT_STEP_M,
@@ -102,7 +102,7 @@ def plan(
     request: PlanRequest,
     frame_id: str = '',
     progress: Callable[[str, float], None] = lambda what, share: None,
-    zones: PointZones | None = None,
+    zones: Zones | None = None,
 ) -> Plan:
     """Plan passes and simulate their film; ``progress`` gets the step and its share, 0 to 1.
 
@@ -295,14 +295,14 @@ def kept_clear(planned: Planned, envelope: GunEnvelope) -> Planned:
     """The plan with the places where gun or spray come too close to the part.
 
     Raises:
-        PlanError: the gun touches the part, and the request does not allow it.
+        PlanError: the gun touches the part.
     """
     found = contacts(planned.surface, planned.trajectory, envelope)
     touched = [contact for contact in found if contact.by_gun]
-    if touched and not planned.request.allow_contact:
+    if touched:
         raise PlanError(
             f'{max(touched, key=lambda contact: contact.depth_m)}; give a greater standoff_m or '
-            'smoothing_radius_m, another side (outward), or plan it face by face with `paint plan '
-            '--faces auto`, of which allow_contact keeps it'
+            'smoothing_radius_m, another side (outward), a smaller gun (--gun-radius-m, '
+            '--gun-length-m), or plan it face by face with `paint plan --faces auto`'
         )
     return replace(planned, contacts=found, envelope=envelope)

@@ -26,7 +26,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.joints import rows_apart
 from paint_deposition.planning.passes import PlannedPass
@@ -47,12 +47,12 @@ class WantedFilm:
     target_um: float | None  # mean target there; None: it is that of the film as it is
     elsewhere_um: float | None  # target outside of the zones, None: none
     share: np.ndarray  # (V,) target of each vertex over the mean target
-    zones: PointZones | None = None  # of the vertices
+    zones: Zones | None = None  # of the vertices
     free_m2: float = 0.0  # what is painted and has no target [m^2]
 
     @staticmethod
     def of(
-        surface: Surface, region: np.ndarray, target_um: float | None, zones: PointZones | None
+        surface: Surface, region: np.ndarray, target_um: float | None, zones: Zones | None
     ) -> WantedFilm:
         """In zones their targets, and elsewhere ``target_um``, count on a region (V,) bool.
 
@@ -84,7 +84,7 @@ class WantedFilm:
                 f'{self.free_m2:.2g} m2 of what is painted are in no zone and have no target: any '
                 'film is taken there; give --target-um, or a zone over them'
             )
-        for one in self.zones.zones.zones if self.zones else ():
+        for one in self.zones.zones if self.zones else ():
             if one.name not in laid.zones:
                 yield (
                     f'zone {one.name} is left out: the passes do not paint it, or hardly; give '
@@ -128,7 +128,7 @@ def simulated(
 ) -> tuple[np.ndarray, PaintUsed]:
     """(V,) film of a motion [um], and what it sprays."""
     path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
-    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    integrator = FilmIntegrator(surface.points(), model, occluder=surface)
     integrator.add(path, lambda done: progress(done / len(path)))
     return integrator.film_um, integrator.used
 

@@ -17,7 +17,6 @@ from paint_deposition.motion.trajectory import (
     ONLY_BRUSH,
     Trajectory,
     gap_ns,
-    numbered,
 )
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.requests import ImproveRequest
@@ -166,7 +165,7 @@ class Programme:
             quaternions_xyzw=whole.quaternions_xyzw,
             trigger_stamps_ns=np.array(triggers, np.int64),
             trigger_flow=np.array(flows),
-            trigger_brush=numbered(brushes),
+            trigger_brush=np.array(brushes, np.int64),
         )
 
 

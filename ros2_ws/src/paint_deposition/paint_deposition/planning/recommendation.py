@@ -13,7 +13,6 @@ from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.planning.placement import (
     SEARCHED,
     IndexCurve,
-    Minimum,
     choose_index,
     parallel_passes,
     passes_to_cover,
@@ -31,15 +30,13 @@ class Recommendation:
     Attributes:
         index_m, sigma_n: the recommended index and eq. (5) there.
         index_range_m: range searched.
-        tolerance: largest sigma_n accepted, or None.
-        windows_m: index intervals in the range within tolerance.
-        minima: all local minima inside the range.
+        windows_m: index intervals in the range within the tolerance of the request.
         mean_um: mean film at index and speed.
         speed_m_per_s: of the passes.
         passes, cycle_time_s: for the width asked for, or None. The time runs from the first
             opening of the gun to its last closing, transfers between passes included.
         length_m: of a pass, that they were counted for.
-        curve: sigma_n over the range.
+        curve: sigma_n over the range, with all local minima inside it.
         standoff_m: TCP to plane. request: how the passes run.
         sb50_m: SB50 of one pass, its width at half its peak.
         index_drift_m: least and largest index that keep to the tolerance, or None.
@@ -51,9 +48,7 @@ class Recommendation:
     index_m: float
     sigma_n: float
     index_range_m: tuple[float, float]
-    tolerance: float | None
     windows_m: tuple[tuple[float, float], ...]
-    minima: tuple[Minimum, ...]
     mean_um: float
     speed_m_per_s: float
     passes: int | None
@@ -89,12 +84,14 @@ class Recommendation:
     def to_dict(self) -> dict[str, Any]:
         """The content of ``recommendation.json``."""
         figures = {k: v for k, v in vars(self).items() if k not in ('curve', 'request')}
-        assumed = ('target_um', 'width_m', 'gun_turns', 'travel_rad', 'assumption')
+        assumed = ('target_um', 'tolerance', 'width_m', 'gun_turns', 'travel_rad', 'assumption')
         return {
             **figures,
             'travel': self.travel,
             **{name: getattr(self.request, name) for name in assumed},
-            'minima': [vars(minimum) for minimum in self.minima],
+            'minima': [
+                {'index_m': index, 'sigma_n': sigma_n} for index, sigma_n in self.curve.minima
+            ],
             'curve': {
                 'index_m': self.curve.index_m.tolist(),
                 'sigma_n': self.curve.sigma_n.tolist(),
@@ -129,26 +126,27 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     if request.speed_m_per_s is None:
         searched = _within_speeds(parallel, speed, request, *searched)
     curve = IndexCurve.of(parallel, *searched)
-    best = choose_index(curve, request.tolerance)
-    period = np.linspace(0.0, parallel.period_m(best.index_m), 65)
+    best = index_m, _ = choose_index(curve, request.tolerance)
+    period = np.linspace(0.0, parallel.period_m(index_m), 65)
     # Film below this share of the mean, between passes, is a bare stripe.
-    if parallel.thickness_um(best.index_m, period).min() < 0.01 * parallel.mean_um(best.index_m):
+    if parallel.thickness_um(index_m, period).min() < 0.01 * parallel.mean_um(index_m):
         raise PlanError(
-            f'an index of {best.index_m:.3f} m leaves bare stripes: one pass is '
+            f'an index of {index_m:.3f} m leaves bare stripes: one pass is '
             f'{width:.3f} m wide at half its height; search about that index'
         )
     if request.speed_m_per_s is None:
         curve, best, speed = _at_target(model, request, curve, best, speed)
+    index_m, sigma_n = best
     tolerance = request.tolerance
     windows = curve.windows_m(tolerance) if tolerance is not None else []
     index_drift = standoff_drift = None
     if windows:
-        index_drift = next(w for w in windows if w[0] - NEAR <= best.index_m <= w[1] + NEAR)
+        index_drift = next(w for w in windows if w[0] - NEAR <= index_m <= w[1] + NEAR)
         if not model.effects:
             # The bare projection widens a pass in proportion to its distance from the emission
             # point, which is as good as a narrower index.
             distance = standoff + model.projection.emission_offset_m
-            nearer, further = (distance * (best.index_m / end - 1.0) for end in index_drift[::-1])
+            nearer, further = (distance * (index_m / end - 1.0) for end in index_drift[::-1])
             standoff_drift = max(nearer, -standoff), further
     notes = _notes(model, request, curve, best, speed)
     if searched != request.index_range_m(width):
@@ -159,17 +157,15 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     passes = cycle_time = None
     length = request.width_m and (request.length_m or request.width_m)
     if request.width_m is not None and length is not None:
-        passes = passes_to_cover(curve.parallel, best.index_m, request.width_m)
-        between = math.hypot(length, best.index_m) if request.one_way else best.index_m
+        passes = passes_to_cover(curve.parallel, index_m, request.width_m)
+        between = math.hypot(length, index_m) if request.one_way else index_m
         cycle_time = (passes * length + (passes - 1) * between) / speed
     return Recommendation(
-        index_m=best.index_m,
-        sigma_n=best.sigma_n,
+        index_m=index_m,
+        sigma_n=sigma_n,
         index_range_m=(float(curve.index_m[0]), float(curve.index_m[-1])),
-        tolerance=tolerance,
         windows_m=tuple(windows),
-        minima=curve.minima,
-        mean_um=curve.parallel.mean_um(best.index_m),
+        mean_um=curve.parallel.mean_um(index_m),
         speed_m_per_s=speed,
         passes=passes,
         cycle_time_s=cycle_time,
@@ -209,13 +205,14 @@ def _within_speeds(
 
 
 def _at_target(
-    model: DepositionModel, request: IndexRequest, curve: IndexCurve, best: Minimum, speed: float
-) -> tuple[IndexCurve, Minimum, float]:
+    model: DepositionModel, request: IndexRequest, curve: IndexCurve, best: tuple[float, float],
+    speed: float,
+) -> tuple[IndexCurve, tuple[float, float], float]:  # fmt: skip
     """Choose the speed: film goes as 1 / speed, unless an effect depends on the speed."""
     assert request.target_um is not None
     low, high = float(curve.index_m[0]), float(curve.index_m[-1])
     for _ in range(6):
-        wanted = speed * curve.parallel.mean_um(best.index_m) / request.target_um
+        wanted = speed * curve.parallel.mean_um(best[0]) / request.target_um
         if not model.effects or abs(wanted - speed) <= NEAR * speed:
             parallel = curve.parallel
             first = parallel.first.scaled(speed / wanted)
@@ -228,27 +225,28 @@ def _at_target(
 
 
 def _notes(
-    model: DepositionModel, request: IndexRequest, curve: IndexCurve, best: Minimum, speed: float
-) -> list[str]:
-    notes = [request.assumption]
+    model: DepositionModel, request: IndexRequest, curve: IndexCurve, best: tuple[float, float],
+    speed: float,
+) -> list[str]:  # fmt: skip
+    notes, (index_m, sigma_n) = [request.assumption], best
     if not request.one_way:
         otherwise = request.model_copy(update={'gun_turns': not request.gun_turns})
-        there = parallel_passes(model, otherwise, speed, SEARCHED).sigma_n(best.index_m)
-        if abs(there - best.sigma_n) > 1e-4:
+        there = parallel_passes(model, otherwise, speed, SEARCHED).sigma_n(index_m)
+        if abs(there - sigma_n) > 1e-4:
             how = 'turned by 180 deg every way back'
             if request.gun_turns:
                 how = 'keeping its orientation'
             notes.append(f'with the gun {how} sigma_n there would be {100 * there:.2f} %')
-    end = curve.best_end
+    end_m, end_sigma_n = curve.best_end
     if best not in curve.minima:
-        side = 'smaller' if best.index_m < curve.index_m.mean() else 'greater'
+        side = 'smaller' if index_m < curve.index_m.mean() else 'greater'
         notes.append(f'there is no minimum of sigma_n here; it is more even at a {side} index')
-    elif request.tolerance is None and end.sigma_n < best.sigma_n:
+    elif request.tolerance is None and end_sigma_n < sigma_n:
         notes.append(
-            f'at the end of the range, {1e3 * end.index_m:.0f} mm, sigma_n is only '
-            f'{100 * end.sigma_n:.2f} %, but no minimum'
+            f'at the end of the range, {1e3 * end_m:.0f} mm, sigma_n is only '
+            f'{100 * end_sigma_n:.2f} %, but no minimum'
         )
-    mean = curve.parallel.mean_um(best.index_m)
+    mean = curve.parallel.mean_um(index_m)
     if request.target_um is not None and abs(mean / request.target_um - 1.0) > 1e-3:
         right = speed * mean / request.target_um
         notes.append(f'the target of {request.target_um:g} µm would need {right:.3g} m/s')

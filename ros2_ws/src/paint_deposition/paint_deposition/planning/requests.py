@@ -16,8 +16,8 @@ Positive = Annotated[float, Field(gt=0.0)]
 Vector = Annotated[tuple[float, float, float], BeforeValidator(tuple)]
 
 
-class FilmBuild(Request):
-    """How much film passes lay."""
+class PassRequest(Request):
+    """How passes run and what they lay."""
 
     speed_m_per_s: float | None = given(
         None, 'Speed of the passes [m/s].', '--speed',
@@ -26,11 +26,6 @@ class FilmBuild(Request):
     target_um: float | None = given(
         None, 'Mean film wanted; without --speed the speed is chosen for it [µm].', above=0.0
     )
-
-
-class PassRequest(FilmBuild):
-    """How passes run and what they lay."""
-
     index_min_m: float | None = given(
         None,
         'Least index [m]; default: 0.2; where SB50 is outside 0.25 to 0.75 m, 0.35 of it.',
@@ -167,12 +162,6 @@ class PlanRequest(SpeedLimits, PassRequest):
     )  # fmt: skip
     time_weight: float = given(
         5e-3, 'With --optimise: the same for the time of the plan without it.', least=0.0
-    )
-
-    allow_contact: bool = given(
-        False,
-        'Keep passes on which the gun touches the part, and say so in the head of the robot '
-        'program; default: they are refused.',
     )
 
     @model_validator(mode='after')

@@ -148,7 +148,7 @@ class ReportData:
             for model in self.models:
                 acting, films = model.without(one.switched_off), []
                 for sign, rows in one.films:
-                    film = FilmIntegrator(points, acting, 'double', one.surface.occluder)
+                    film = FilmIntegrator(points, acting, 'double', one.surface)
                     film.add(one.path.select(rows))
                     films.append((sign, film))
                 film_um = sum_um((sign, film.film_um) for sign, film in films)

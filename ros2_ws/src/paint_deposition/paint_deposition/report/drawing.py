@@ -26,7 +26,7 @@ from paint_deposition.part.edges import coarse_faces, edges_of
 from paint_deposition.part.points import downhill_axis
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 from paint_deposition.report.colour_scales import BEFORE, GRID, INK, MUTED, TABLE, ColourScale
 
 DOTS_PER_INCH = 150
@@ -168,7 +168,7 @@ class PartPicture:
             bands.set_clip_path(outline.get_paths()[0], axes.transData)
         self._draw_edges(axes)
 
-    def zone_shares(self, zones: PointZones) -> dict[int, np.ndarray]:
+    def zone_shares(self, zones: Zones) -> dict[int, np.ndarray]:
         """(V,) 1 in each zone and 0 outside, smoothed: its border is at a half, not by triangles.
 
         Zones that are not seen are left out.
@@ -185,7 +185,7 @@ class PartPicture:
             shares[number] = share
         return shares
 
-    def draw_zones(self, axes: Axes, zones: PointZones | None, spray: SprayPath) -> None:
+    def draw_zones(self, axes: Axes, zones: Zones | None, spray: SprayPath) -> None:
         """The borders of the zones of the vertices, with names and targets clear of the passes."""
         if zones is None:
             return
@@ -201,7 +201,7 @@ class PartPicture:
             obstacles = np.concatenate([passes, middles[~own], self.edges_m.mean(axis=1)])
             shape = np.array([5.0, 1.0])  # a label is so much wider than high
             away, _ = cKDTree(obstacles / shape).query(middles[own] / shape)
-            zone = zones.zones.zones[number]
+            zone = zones.zones[number]
             axes.annotate(
                 f'{zone.name}  {zone.target_um:g} ± {zone.tolerance_um:g} µm',
                 middles[own][np.argmax(away)], fontsize=8.5, color=INK, ha='center', va='center',

@@ -15,7 +15,7 @@ from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics, wanted_at
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 from paint_deposition.report.colour_scales import (
     BARE,
     BELOW,
@@ -44,7 +44,7 @@ def film_picture(
     statistics: FilmStatistics,
     title: str,
     subtitle: str,
-    zones: PointZones | None = None,
+    zones: Zones | None = None,
 ) -> Figure:
     """A painted part with the figures of its film (V,) [um].
 
@@ -131,14 +131,14 @@ def _draw_band(
     film_um: np.ndarray,
     spray: SprayPath,
     s: FilmStatistics,
-    zones: PointZones | None,
+    zones: Zones | None,
 ) -> None:
     low, high = part.window(spray)
     part.dress(axes, low, high)
     shares = part.zone_shares(zones) if zones else {}
     # The first lies below all others, so that no gap is left between smoothed borders.
     for below, number in enumerate(sorted(shares) or [-1]):
-        zone = zones.zones.zones[number].name if zones and number >= 0 else ''
+        zone = zones.zones[number].name if zones and number >= 0 else ''
         wanted = s.zones[zone] if zone else s
         ends, colours = [s.painted_above_um], [BARE]
         for end, colour in zip(wanted.band_um, (BELOW, WITHIN), strict=True):
@@ -157,7 +157,7 @@ def _draw_band_legend(
     surface: Surface,
     film_um: np.ndarray,
     s: FilmStatistics,
-    zones: PointZones | None,
+    zones: Zones | None,
 ) -> None:
     """Shares, histogram, and Cpk or the figures of the zones."""
     low, high = s.band_um
@@ -208,7 +208,7 @@ def _write(axes: Axes, text: str, size: float = 9.5) -> None:
 
 
 def _draw_histogram(
-    axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmStatistics, zones: PointZones | None
+    axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmStatistics, zones: Zones | None
 ) -> None:
     """Area over film, of zones in tolerances from their targets, with the band behind it."""
     painted, shown = film_um > s.painted_above_um, film_um

@@ -14,7 +14,6 @@ from matplotlib.patches import Patch
 
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.improvement import Improvement
@@ -83,8 +82,8 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
     """Draw sigma_n over the index with its minima, the tolerance and the recommended index."""
     quiet(axes, 'index [mm]', r'$\sigma_N$ [%]', 'Evenness over the index, eq. (5)')
     top = 1.08 * 100.0 * float(answer.curve.sigma_n.max())
-    if answer.tolerance is not None:
-        tolerance = 100.0 * answer.tolerance
+    if answer.request.tolerance is not None:
+        tolerance = 100.0 * answer.request.tolerance
         if tolerance < top:
             axes.axhline(tolerance, color=MUTED, linewidth=0.9, linestyle='--')
             # At the end where the curve stays away from it.
@@ -98,9 +97,9 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
         for low, high in answer.windows_m:
             axes.axvspan(MM * low, MM * high, color='#d9ecf0', linewidth=0.0, zorder=0)
     axes.plot(MM * answer.curve.index_m, 100.0 * answer.curve.sigma_n, color=ACCENT, linewidth=1.8)
-    for minimum in answer.minima:
+    for index_m, sigma_n in answer.curve.minima:
         axes.plot(
-            MM * minimum.index_m, 100.0 * minimum.sigma_n, 'o', markersize=5,
+            MM * index_m, 100.0 * sigma_n, 'o', markersize=5,
             markerfacecolor='white', markeredgecolor=ACCENT, markeredgewidth=1.5,
         )  # fmt: skip
     chosen = MM * answer.index_m, 100.0 * answer.sigma_n
@@ -127,7 +126,7 @@ def write_geometry_picture(
         2, 2, width_ratios=_ratios(sizes[0][0], sizes[1][0]),
         height_ratios=_ratios(sizes[0][1], sizes[2][1]),
     )  # fmt: skip
-    size_m = float(np.linalg.norm(box_extent_m(corners)))
+    size_m = float(np.linalg.norm(np.ptp(corners, axis=0)))
     places, names = ((0, 0), (0, 1), (1, 0)), ('from the gun', 'from its right', 'from its top')
     for place, view, name in zip(places, views, names, strict=True):
         axes = figure.add_subplot(grid[place])

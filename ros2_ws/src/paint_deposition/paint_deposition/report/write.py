@@ -18,7 +18,7 @@ from paint_deposition.files.provenance import origin
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 from paint_deposition.report.colour_scales import film_scale
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def write_film(
     statistics: FilmStatistics,
     *,
     coats_um: Mapping[str, np.ndarray] | None = None,
-    zones: PointZones | None = None,
+    zones: Zones | None = None,
     stem: str = 'film',
     statistics_file: str = 'stats.json',
     details: Mapping[str, Any] | None = None,

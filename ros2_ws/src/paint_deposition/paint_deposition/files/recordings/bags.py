@@ -27,7 +27,6 @@ from paint_deposition.motion.trajectory import (
     ONLY_BRUSH,
     SPRAYS_NOTHING,
     Trajectory,
-    numbered,
     relative_flow,
 )
 from paint_deposition.motion.transforms import Rigid
@@ -155,7 +154,7 @@ def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarr
     return replace(
         motion, trigger_stamps_ns=np.array([change[0] for change in changes], np.int64),
         trigger_flow=np.array([change[1] for change in changes], float),
-        trigger_brush=numbered([change[2] for change in changes]), trigger_rows=rows,
+        trigger_brush=np.array([change[2] for change in changes], np.int64), trigger_rows=rows,
         settings=settings, notes=(*motion.notes, *notes),
     )  # fmt: skip
 

@@ -26,7 +26,7 @@ from paint_deposition.files.tables.table import SWITCHED
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.stream_quality import FARTHEST_PART_M, StreamQuality
-from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered, relative_flow
+from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, relative_flow
 from paint_deposition.request import MotionOptions
 
 if TYPE_CHECKING:
@@ -134,7 +134,10 @@ def _motion(table: PoseTable, robot: 'Robot | None', options: MotionOptions) -> 
     if flows is None:
         return poses
     return replace(
-        poses, trigger_stamps_ns=stamps, trigger_flow=flows, trigger_brush=numbered(brushes)
+        poses,
+        trigger_stamps_ns=stamps,
+        trigger_flow=flows,
+        trigger_brush=np.array(brushes, np.int64),
     )
 
 

@@ -91,7 +91,7 @@ def zone_readings(campaign: Campaign, readings: Residuals) -> tuple[ZoneReadings
         if of is None:
             continue
         points = experiment.readings.point
-        for k, zone in enumerate(of.zones.zones):
+        for k, zone in enumerate(of.zones):
             inside = (of.number == k)[experiment.means.owner]
             found.append(
                 ZoneReadings.of(experiment.name, zone, own.select(inside), points[inside])

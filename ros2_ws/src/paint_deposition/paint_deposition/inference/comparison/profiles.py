@@ -147,7 +147,7 @@ def _film_along(
 
     path, count, films = experiment.path, int(on.sum()), []
     for model in models:
-        integrator = FilmIntegrator(points, model, 'double', experiment.surface.occluder)
+        integrator = FilmIntegrator(points, model, 'double', experiment.surface)
         integrator.add(path)
         films.append(integrator.gauge_um[:count])
     # Of a pass alone the others are kept, with the gun off.

@@ -47,7 +47,7 @@ class UnmeasuredPart:
     def film_um(self) -> np.ndarray:
         """(V,) film that the model predicts at the vertices [um]."""
         surface = self.surface
-        painted = FilmIntegrator(surface.points(), self.model, occluder=surface.occluder)
+        painted = FilmIntegrator(surface.points(), self.model, occluder=surface)
         painted.add(self.path)
         return painted.film_um
 

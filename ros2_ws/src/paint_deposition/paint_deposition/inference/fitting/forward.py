@@ -174,7 +174,7 @@ class _Part:
             # Points left over from the kernel's SIMD lanes would cost several times their share.
             filled = np.pad(np.arange(len(points)), (0, -len(points) % LANES), 'edge')
             integrator = self._integrators[slope] = FilmIntegrator(
-                points.select(filled), model, 'double', self.experiment.surface.occluder,
+                points.select(filled), model, 'double', self.experiment.surface,
                 keep_absent_laws=True, parallel=False,
             )  # fmt: skip
         integrator.use(model)

@@ -19,7 +19,7 @@ from paint_deposition.inference.readings.readings import PointMeans, Readings
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 
 # Half the width of the stencil from which the film's slope at a reading is taken [m].
 STENCIL_M = 0.006
@@ -48,7 +48,7 @@ class Experiment:
     frame_id: str = ''  # of the recorded poses, '' where not known
     films: WetFilms = ONE_FILM  # what is read, as wet films that sub-steps of the path laid
     layer: str = TOTAL  # what is read, by the names of its coats
-    zones: PointZones | None = None  # of the vertices of the surface, each with a target
+    zones: Zones | None = None  # of the vertices of the surface, each with a target
     target: tuple[float, float] | None = None  # its own target and tolerance [um]
 
     @staticmethod
@@ -138,7 +138,7 @@ class Experiment:
         return f'{self.readings.understood or self.readings.source}; {moved}'
 
     @cached_property
-    def zones_of_points(self) -> PointZones | None:
+    def zones_of_points(self) -> Zones | None:
         """The zones of the P measured points; None without zones."""
         points = self.measured_points
         return self.zones and self.zones.at(points.positions_m, points.normals)

@@ -153,7 +153,7 @@ def targets_in_doubt(experiment: Experiment, target_um: float) -> Iterator[str]:
     film, found = experiment.means.mean_um, experiment.zones_of_points
     number = np.full(len(film), NONE) if found is None else found.number
     wanted = [('the target', target_um, NONE)] if target_um else []
-    zones = found.zones.zones if found else ()
+    zones = found.zones if found else ()
     wanted += [(f"zone '{one.name}'", one.target_um, k) for k, one in enumerate(zones)]
     for name, wanted_um, zone in wanted:
         own = film[number == zone]

@@ -16,8 +16,8 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns, trigger_change
-from paint_deposition.motion.pose_stream import PoseBatch
-from paint_deposition.motion.stream_quality import SpeedNow, StreamSteps
+from paint_deposition.motion.pose_stream import NO_POSES, PoseBatch, newest_poses
+from paint_deposition.motion.stream_quality import StreamSteps
 from paint_deposition.motion.trajectory import SPRAYS_NOTHING
 from paint_deposition.motion.transforms import NoTransform
 from paint_deposition.nodes import topics
@@ -53,7 +53,8 @@ class AtomizerInput:
             before the first.
         refused_s, pose_s: monotonic times of the last pose refused and of the last one received.
         spraying: whether the gun sprays, by the newest state; False before the first.
-        speed: of the TCP now; programmed_m_per_s: by the newest state, 0 or NaN: unknown.
+        last_poses: those that show the speed of the TCP now; programmed_m_per_s: that of the
+            newest state, 0 or NaN: unknown.
         tf_queue: poses that wait for their transform.
         refused_frames: poses refused for their frame, by frame; refusal: reason of the last.
         unpainted: poses received while the node was not active.
@@ -72,7 +73,7 @@ class AtomizerInput:
         self.poses_received = self.newest_ns = self.sent_ns = self.state_sent_ns = 0
         self.refused_s = self.pose_s = self._flushed_s = -math.inf
         self.spraying, self.programmed_m_per_s = False, 0.0
-        self.speed = SpeedNow()
+        self.last_poses = NO_POSES
         self._newest: PoseStamped | None = None
         # Stamp of a state that is ahead of the poses, and when it was sent [ns].
         self._state_ahead: tuple[int, int] | None = None
@@ -202,7 +203,7 @@ class AtomizerInput:
         jumped = self.steps.jumps
         self.steps.add_stamps(stamps)
         if len(moved):
-            self.speed.add(moved.stamps_ns, moved.positions_m)
+            self.last_poses = newest_poses(self.last_poses, moved)
             self.steps.add_places(moved.stamps_ns, moved.positions_m)
         if self.steps.jumps and not jumped:
             self._node.get_logger().error(

@@ -44,7 +44,7 @@ from paint_deposition.nodes.topics import (
 )
 from paint_deposition.part.points import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 from paint_deposition.report.colour_scales import TABLE, ColourScale, film_scale
 
 # A subscriber that acknowledges nothing for so long does not delay the others.
@@ -56,7 +56,7 @@ def statistics_of(
     surface: Surface,
     film_um: np.ndarray,
     emitted_cm3: float,
-    zones: PointZones | None,
+    zones: Zones | None,
 ) -> FilmStatistics:
     """The statistics of a film (V,), by the targets and the thresholds among the parameters."""
     chosen = {k: values[k] for k in ('painted_above_um', 'target_um', 'target_tolerance_um')}

@@ -77,7 +77,7 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         'longest interval [s]': f'{source.steps.longest_ns * 1e-9:.3f}',
         'intervals over 1.5 times the usual one': source.steps.long,
         'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
-        'speed [m/s]': f'{source.speed.m_per_s:.3f}',
+        'speed [m/s]': f'{source.last_poses.speed_m_per_s:.3f}',
         'programmed speed [m/s]': f'{programmed:.3f}' if programmed > 0.0 else 'unknown',
         'fastest step [m/s]': f'{source.steps.fastest_m_per_s:.1f}',
         UNPAINTED: source.unpainted,

@@ -16,6 +16,7 @@ from paint_deposition.files.effect_file import read_effect_file, try_effect
 from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.trajectory import BEFORE_ALL_NS
 from paint_deposition.nodes.frames import PartFrame
 from paint_deposition.nodes.managed_node import ManagedNode
@@ -165,7 +166,7 @@ class PaintingNode(ManagedNode, ABC):
         """An unpainted film for the model of each gun."""
         named = ('max_pose_gap_s', 'trigger_latency_s', 'pose_memory')
         options: dict[str, Any] = {name: self.values[name] for name in named}
-        options |= {'precision': self.PRECISION, 'occluder': surface.occluder}
+        options |= {'precision': self.PRECISION, 'occluder': surface}
         return LiveFilms(tuple(LiveFilm(points, model, **options) for model in models))
 
     def _take_part(self, part: PreparedPart) -> None:
@@ -312,9 +313,11 @@ class PaintingNode(ManagedNode, ABC):
         """
         most = 2000
         for number in tuple(self._guns_to_orient):
-            poses = self.film.guns[number].log.first_poses(most)
-            if poses is None:
+            events = self.film.guns[number].log.events()
+            batches = [event for event in events if isinstance(event, PoseBatch)]
+            if not batches:
                 continue
+            poses = PoseBatch.joined(batches).select(slice(most))
             positions, axes = poses.finite_axes()
             front, back, _ = facing(self.surface, positions, axes)
             pointing = front + back

@@ -26,10 +26,10 @@ from paint_deposition.nodes.parameters import (
 )
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.zones import PointZones
+from paint_deposition.part.zones import Zones
 
 # A part ready to be painted: its refined surface, points on it, unpainted film, and zones.
-PreparedPart = tuple[Surface, SurfacePoints, LiveFilms, PointZones | None]
+PreparedPart = tuple[Surface, SurfacePoints, LiveFilms, Zones | None]
 
 
 def model_parameters(use: str) -> dict[str, NodeParameter]:
