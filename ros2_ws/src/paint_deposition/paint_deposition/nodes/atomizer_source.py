@@ -28,7 +28,7 @@ from paint_deposition.nodes.topics import (
     header,
     message_class,
     pose_message,
-    unknown_state,
+    state_message,
 )
 from paint_deposition.request import MotionOptions
 
@@ -236,11 +236,12 @@ class AtomizerSource(PaintNode):
             return
         full = self.values['calibrated_flow']
         speed = self._values.get('speed', math.nan) * self.values['speed_scale']
-        state = unknown_state()
-        state.spraying = bool(self._signals['trigger'].is_on(self._values['trigger']))
-        state.flow = self._values.get('flow', full) / full
-        state.brush = int(self._values.get('brush', ONLY_BRUSH))
-        state.programmed_speed_m_per_s = speed
+        state = state_message(
+            spraying=bool(self._signals['trigger'].is_on(self._values['trigger'])),
+            flow=self._values.get('flow', full) / full,
+            brush=int(self._values.get('brush', ONLY_BRUSH)),
+            programmed_speed_m_per_s=speed,
+        )
         if str(state) != self._published:  # NaN does not equal itself
             self._published = str(state)
             state.header = header(self._base, at_ns)

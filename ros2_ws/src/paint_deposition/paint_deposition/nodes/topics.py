@@ -22,7 +22,6 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
 from paint_deposition.files.recordings.messages import nanoseconds
-from paint_deposition.motion.pose_stream import TriggerChange
 
 # On which every subscriber of the poses reports its progress.
 PROGRESS_TOPIC = 'atomizer/progress'
@@ -61,13 +60,6 @@ def node_name(info: TopicEndpointInfo) -> str:
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
 
 
-class PolledCallbackGroup(MutuallyExclusiveCallbackGroup):
-    """A callback group that never runs: its subscriptions are polled and do not wake the node."""
-
-    def can_execute(self, _entity: Any) -> bool:
-        return False
-
-
 class AdaptiveSubscription:
     """Hears each publisher of a topic as reliably, and with `latched` as latched, as it offers.
 
@@ -101,7 +93,7 @@ class AdaptiveSubscription:
     ) -> None:
         self._node, self._message, self._topic, self._take = node, message, topic, take
         self._depth, self._latched, self._raw, self._polled = depth, latched, raw, polled
-        self._group = PolledCallbackGroup() if polled else None
+        self._group = MutuallyExclusiveCallbackGroup() if polled else None
         self.lost = 0
         # Of each publisher its newest number; the one heard last is last.
         self._newest: dict[bytes, int] = {}
@@ -137,11 +129,14 @@ class AdaptiveSubscription:
         for quality in sorted(wanted - self._subscriptions.keys(), key=_strictest_first):
             self._made_s[quality] = self._matched_s
             reliability, durability = quality
-            self._subscriptions[quality] = self._node.create_subscription(
+            subscription = self._subscriptions[quality] = self._node.create_subscription(
                 self._message, self._topic, partial(self._on_message, quality),
                 QoSProfile(depth=self._depth, reliability=reliability, durability=durability),
                 callback_group=self._group, raw=self._raw,
             )  # fmt: skip
+            if self._group is not None:
+                # In a group that is busy for ever, what is polled does not wake the node.
+                self._group.beginning_execution(subscription)
         self._wanted_s |= dict.fromkeys(wanted, self._matched_s)
         for quality in [*self._subscriptions]:
             if self._matched_s - self._wanted_s[quality] > OVERLAP_S:
@@ -210,18 +205,11 @@ def pose_message(frame_id: str, stamp_ns: int, values: Iterable[float]) -> PoseS
     return pose
 
 
-def unknown_state() -> AtomizerState:
-    """A state whose numbers are not known."""
+def state_message(**known: Any) -> AtomizerState:
+    """A state of which these fields are known; its other numbers are NaN."""
     kinds = AtomizerState.get_fields_and_field_types()
-    return AtomizerState(**{name: math.nan for name, kind in kinds.items() if kind == 'double'})
-
-
-def state_message(frame_id: str, change: TriggerChange) -> AtomizerState:
-    """A state that says no more of the gun than this."""
-    state = unknown_state()
-    state.header, state.spraying = header(frame_id, change.stamp_ns), change.flow > 0.0
-    state.flow, state.brush = change.flow, change.brush
-    return state
+    unknown = {name: math.nan for name, kind in kinds.items() if kind == 'double'}
+    return AtomizerState(**unknown | known)
 
 
 def message_class(type_name: str) -> type:

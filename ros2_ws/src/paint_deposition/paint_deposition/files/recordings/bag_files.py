@@ -116,11 +116,6 @@ class Bag:
             )
         return topic
 
-    def type_hash(self, topic: BagTopic) -> str:
-        """RIHS01 hash of a topic's type as the bag defines it."""
-        with _read_errors(self.path):
-            return self._types(topic.name).hash_rihs01(topic.type)
-
     def decode(self, message: RawMessage) -> Any:
         """The message object of rosbags for one of this bag's messages."""
         with _read_errors(self.path):

@@ -22,7 +22,6 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage, open_bag
 from paint_deposition.files.recordings.bags import (
     BOOL_TYPE,
@@ -31,7 +30,7 @@ from paint_deposition.files.recordings.bags import (
     trajectory_of,
 )
 from paint_deposition.files.recordings.joint_states import Robot
-from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, stamp_ns
+from paint_deposition.files.recordings.messages import TF_TYPES, stamp_ns
 from paint_deposition.files.recordings.pose_topics import (
     PART_POSE_TYPE,
     POSE_TYPE,
@@ -40,12 +39,12 @@ from paint_deposition.files.recordings.pose_topics import (
     part_pose_topics,
     read_frames,
 )
-from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
+from paint_deposition.motion.trajectory import relative_flow
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
 from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
-from paint_deposition.nodes.topics import header, header_stamp_ns, pose_message, unknown_state
+from paint_deposition.nodes.topics import header, header_stamp_ns, pose_message, state_message
 from paint_deposition.request import MotionOptions
 
 
@@ -146,16 +145,12 @@ class BagPlayer(PaintNode):
             else:
                 self._motion = motion_of(bag, *motion)
             self._state_topic: BagTopic | None = None
-            self._states_are_current = False
             unused = [topic.name for topic in bag.topics_of(*STATE_TYPES)]
             if values['state_topic']:
                 self._state_topic = bag.choose(values['state_topic'], STATE_TYPES, 'state')
                 if self._state_topic.type == BOOL_TYPE:
                     # Raises an error unless recorder and robot had the same clock.
                     trajectory_of(bag, motion[0], values['state_topic'], *motion[1:])
-                else:
-                    today = definitions.installed(STATE_TYPE).type_hash
-                    self._states_are_current = bag.type_hash(self._state_topic) == today
             elif unused:
                 self.get_logger().info(
                     f'no state_topic: the gun always sprays; the bag has {" ".join(unused)}'
@@ -279,24 +274,19 @@ class BagPlayer(PaintNode):
             self._state_publisher.publish(self._state_of(message, bag))
             self.states_published += 1
 
-    def _state_of(self, message: RawMessage, bag: Bag) -> AtomizerState | bytes:
-        """A recorded Bool or state as the message of today, or its bytes if it is one."""
-        if self._states_are_current:
-            return message.cdr
-        state = unknown_state()
+    def _state_of(self, message: RawMessage, bag: Bag) -> AtomizerState:
+        """A recorded Bool, or state of any version of the message, as a message of today."""
         if message.type == BOOL_TYPE:
-            state.header = header('', message.log_time_ns)
-            state.spraying = deserialize_message(message.cdr, Bool).data
-            state.flow = relative_flow(state.spraying)
-            return state
-        # Of another version of the message, fields of the same name are copied.
+            spraying = deserialize_message(message.cdr, Bool).data
+            at = header('', message.log_time_ns)
+            return state_message(header=at, spraying=spraying, flow=relative_flow(spraying))
         recorded = bag.decode(message)
-        state.header = header(recorded.header.frame_id, stamp_ns(recorded.header))
-        state.spraying = bool(recorded.spraying)
-        state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
-        for name, kind in state.get_fields_and_field_types().items():
-            if kind == 'double':
-                setattr(state, name, float(getattr(recorded, name, math.nan)))
+        at = header(recorded.header.frame_id, stamp_ns(recorded.header))
+        state = state_message(header=at)
+        for name in state.get_fields_and_field_types():
+            if name != 'header' and hasattr(recorded, name):
+                kind = type(getattr(state, name))
+                setattr(state, name, kind(getattr(recorded, name)))
         return state
 
     def _publish_clock(self) -> None:

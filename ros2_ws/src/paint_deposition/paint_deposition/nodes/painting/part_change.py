@@ -348,8 +348,11 @@ class PartChange:
         part.guns = [*node.gun_names]
         part.states_sent_ns = [source.state_sent_ns for source in node.inputs]
         part.states = [
-            state_message(name, change)
+            state_message(
+                header=header(name, change.stamp_ns), spraying=change.flow > 0.0,
+                flow=change.flow, brush=change.brush,
+            )
             for name, gun in zip(part.guns, node.film.guns, strict=True)
             for change in gun.carried_over
-        ]
+        ]  # fmt: skip
         self._publisher.publish(part)
