@@ -151,7 +151,7 @@ def test_meshes_are_read_once_for_each_shape_they_have(simulator, change, wider,
     assert 'third.stl is prepared: Surface(' in prepared.message
 
     def ready() -> str:
-        return node.parts.status().values['meshes prepared']
+        return node.parts.status()[2]['meshes prepared']
 
     assert ready() == third
     for serial, mesh, kept in (
@@ -238,14 +238,14 @@ def test_a_film_is_kept_until_it_is_on_disk(simulated, painted, change, tmp_path
     second = change(serial='2')
     assert (second.success, second.run, second.paths) == (True, '2', [])
     assert f'{unsaved}, and kept' in second.message
-    assert node.parts.status().level == ERROR
+    assert node.parts.status()[0] == ERROR
     folder.unlink()
     source.send(later(MOTION))
     painted(node, len(MOTION))
     third = change(serial='3')
     assert [Path(path).parent.name for path in third.paths] == 3 * ['1'] + 3 * ['2']
     assert saved_um(folder / '1/film.csv') == pytest.approx(film, rel=1e-7)
-    assert node.parts.status().level == OK
+    assert node.parts.status()[0] == OK
     node.trigger_deactivate()
     assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
     assert not node.configured

@@ -253,12 +253,11 @@ class AtomizerSource(PaintNode):
         if self._motion is None:
             if time.monotonic() - self._pose_s > SILENT_S:
                 remedy = 'if none are to come, give urdf_file or base_link'
-                return Status(WARN, f'no poses on {POSES}; {remedy}')
-            return Status(OK, 'the robot publishes its poses')
-        found = self._motion.status()
+                return WARN, f'no poses on {POSES}; {remedy}', {}
+            return OK, 'the robot publishes its poses', {}
+        level, words, values = self._motion.status()
         poses = f"of '{self._motion.tip}' in '{self._base}'"
-        values = {'poses': poses, 'published': self.poses_published, **found.values}
-        return Status(found.level, found.message, values)
+        return level, words, {'poses': poses, 'published': self.poses_published, **values}
 
     def _signals_status(self) -> Status:
         values = {
@@ -266,8 +265,8 @@ class AtomizerSource(PaintNode):
             for name, signal in self._signals.items()
         }
         if problems := [problem for problem in self._problems.values() if problem]:
-            return Status(ERROR, '; '.join(problems), values)
+            return ERROR, '; '.join(problems), values
         missing = [name for name, value in values.items() if value == 'not received']
         if missing:
-            return Status(WARN, f'not received: {" ".join(missing)}', values)
-        return Status(OK, 'following the signals' if values else 'no signal is named', values)
+            return WARN, f'not received: {" ".join(missing)}', values
+        return OK, 'following the signals' if values else 'no signal is named', values

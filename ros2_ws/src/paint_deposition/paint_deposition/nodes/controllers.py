@@ -169,11 +169,11 @@ class SignalSource(PaintNode):
             self.get_logger().error(problem)
         self._logged = {*problems}
         if problems:
-            return Status(ERROR, '; '.join(problems), values)
+            return ERROR, '; '.join(problems), values
         missing = [name for name, value in received.items() if value == 'not received']
         if missing:
-            return Status(WARN, f'not received: {"; ".join(missing)}', values)
-        return Status(OK, 'following the signals', values)
+            return WARN, f'not received: {"; ".join(missing)}', values
+        return OK, 'following the signals', values
 
 
 class RwsSource(SignalSource):

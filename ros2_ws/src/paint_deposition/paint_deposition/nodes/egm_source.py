@@ -287,15 +287,13 @@ class EgmSource(PaintNode):
         }  # fmt: skip
         if time.time_ns() - stream.other_ns < 10_000_000_000:
             remedy = 'give each robot a port and a node of its own, or robot_address'
-            return Status(ERROR, f'{stream.other} sends, too: {remedy}', figures)
+            return ERROR, f'{stream.other} sends, too: {remedy}', figures
         if time.monotonic() - self._heard_s > 2.0:
-            return Status(
-                WARN, f'no packets on UDP port {values["port"]}: start EGMStreamStart with the '
-                'address of this machine in UDPUC', figures,
-            )  # fmt: skip
+            remedy = 'start EGMStreamStart with the address of this machine in UDPUC'
+            return WARN, f'no packets on UDP port {values["port"]}: {remedy}', figures
         if self._lacks:
-            return Status(ERROR, f'packets have {self._lacks}', figures)
+            return ERROR, f'packets have {self._lacks}', figures
         if stream.lost or stream.repeated or stream.invalid:
             words = f'{stream.lost} packets lost, {stream.repeated} repeated'
-            return Status(WARN, f'{words}, {stream.invalid} no EgmRobot', figures)
-        return Status(OK, 'following the robot', figures)
+            return WARN, f'{words}, {stream.invalid} no EgmRobot', figures
+        return OK, 'following the robot', figures

@@ -183,12 +183,12 @@ class JointPoses:
         """Whether joint states arrive, and have all joints."""
         values = {'robot': self._robot.path, 'joint states refused': self._incomplete}
         if self._incomplete and not self._poses:
-            return Status(ERROR, f'no joint state has all joints: {self._refusal}', values)
+            return ERROR, f'no joint state has all joints: {self._refusal}', values
         if time.monotonic() - self._received_s > SILENT_S:
             if self._refusal:
-                return Status(ERROR, f'joint states are refused: {self._refusal}', values)
-            return Status(WARN, f'no joint states on {self._topic}', values)
-        return Status(OK, 'following the robot', values)
+                return ERROR, f'joint states are refused: {self._refusal}', values
+            return WARN, f'no joint states on {self._topic}', values
+        return OK, 'following the robot', values
 
 
 class TfPoses:
@@ -268,14 +268,14 @@ class TfPoses:
             'failed lookups': self._failed_lookups,
         }
         if not frames:
-            return Status(WARN, 'no transforms on /tf', values)
+            return WARN, 'no transforms on /tf', values
         for name in (self.tip, self.base):
             if name not in frames:
                 known = did_you_mean(name, frames)
-                return Status(ERROR, f"tf has no frame '{name}'; {known}", values)
+                return ERROR, f"tf has no frame '{name}'; {known}", values
         if not self._moving:
             reason = f"no moving transforms connect '{self.tip}' to '{self.base}'"
-            return Status(ERROR, reason, values)
+            return ERROR, reason, values
         if time.monotonic() - self._received_s > SILENT_S:
-            return Status(WARN, 'no new transforms of the robot on /tf', values)
-        return Status(OK, 'following the robot', values)
+            return WARN, 'no new transforms of the robot on /tf', values
+        return OK, 'following the robot', values

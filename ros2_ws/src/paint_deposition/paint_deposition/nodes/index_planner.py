@@ -77,7 +77,7 @@ class IndexPlanner(PaintNode):
     def __init__(self, **kwargs: Any):
         super().__init__(**kwargs)
         self._requests = 0
-        self._last = Status(OK, 'no request yet')
+        self._last = OK, 'no request yet'
         self.create_service(RecommendIndex, 'recommend_index', self._recommend)
         self._planning = ThreadPoolExecutor(max_workers=1, thread_name_prefix='plan_passes')
         self._closed = False
@@ -127,10 +127,10 @@ class IndexPlanner(PaintNode):
             )
             answer = recommend(self._selected_model(), index_request)
         except (PaintError, MemoryError) as error:
-            self._last = Status(WARN, str(error) or 'not enough memory')
-            response.message = self._last.message
+            self._last = WARN, str(error) or 'not enough memory'
+            _, response.message = self._last
             return response
-        self._last = Status(OK, answer.sentence)
+        self._last = OK, answer.sentence
         response.success = True
         response.message = '; '.join([answer.sentence, *answer.notes])
         for name in ('index_m', 'sigma_n', 'mean_um', 'speed_m_per_s', 'travel'):
@@ -246,7 +246,7 @@ class IndexPlanner(PaintNode):
             'effects': ' '.join(effect.id for effect in self._model.effects) or 'none',
             'requests': self._requests,
         }
-        return Status(self._last.level, self._last.message, values)
+        return *self._last, values
 
 
 def _path_message(trajectory: Trajectory, start_ns: int) -> Path:

@@ -1,6 +1,7 @@
 """Managed (lifecycle) nodes, which can also configure and activate themselves."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from functools import partialmethod
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
@@ -98,33 +99,13 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     # --- transitions
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('configured', self._enter)
-
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('activated', self._enter)
-
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('deactivated', self._leave, True)
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('cleaned up', self._leave, True)
-
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('shut down', self.close, True)
-
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.close()
-        return TransitionCallbackReturn.SUCCESS
-
-    def _transition_result(
-        self, done: str, transition: Callable[[], None], needs_rest: bool = False
-    ) -> TransitionCallbackReturn:
+    def _transition(self, done: str, step: str, state: LifecycleState) -> TransitionCallbackReturn:
+        """Do the step of that name; `done` says what the node is then."""
         self._failure = None
         try:
-            if needs_rest and self.awaiting:
+            if step != '_enter' and self.awaiting:
                 raise PaintError('a request is under way: call again after it')
-            transition()
+            getattr(self, step)()
         except Exception as error:
             self._failure = error
             if not self.autostarting:  # else the process ends with this error
@@ -133,6 +114,16 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
             return TransitionCallbackReturn.FAILURE if expected else TransitionCallbackReturn.ERROR
         if not self.autostarting:
             self.get_logger().info(done)
+        return TransitionCallbackReturn.SUCCESS
+
+    on_configure = partialmethod(_transition, 'configured', '_enter')
+    on_activate = partialmethod(_transition, 'activated', '_enter')
+    on_deactivate = partialmethod(_transition, 'deactivated', '_leave')
+    on_cleanup = partialmethod(_transition, 'cleaned up', '_leave')
+    on_shutdown = partialmethod(_transition, 'shut down', 'close')
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.close()
         return TransitionCallbackReturn.SUCCESS
 
     def _enter(self) -> None:
@@ -170,7 +161,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
             if not self.configured:
                 # An aggregator would report a status that is no longer published as stale.
                 for task in self.tasks.keys() - {'state'}:
-                    self.tasks[task] = lambda: Status(OK, 'the node is not configured')
+                    self.tasks[task] = lambda: (OK, 'the node is not configured', {})
 
     @property
     def _entities(self) -> set[Any]:
@@ -184,8 +175,8 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     def _state_status(self) -> Status:
         label = self._state_machine.current_state[1]
         if self._failure is not None:
-            return Status(ERROR, f'{label}: {_error_text(self._failure)}')
-        return Status(OK, label)
+            return ERROR, f'{label}: {_error_text(self._failure)}', {}
+        return OK, label, {}
 
 
 def _error_text(error: Exception) -> str:

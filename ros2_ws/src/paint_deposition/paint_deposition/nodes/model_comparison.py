@@ -192,5 +192,5 @@ class ModelComparison(PaintingNode):
         }
         line = f'rms {found.rmse_um:.2f} µm at {len(found)} readings'
         if doubt := zeros_in_doubt(self.readings, found.predicted_um):
-            return Status(WARN, f'{line}; {doubt}', values)
-        return Status(OK, line, values)
+            return WARN, f'{line}; {doubt}', values
+        return OK, line, values

@@ -10,7 +10,6 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -37,15 +36,8 @@ WARN = DiagnosticStatus.WARN
 ERROR = DiagnosticStatus.ERROR
 
 
-@dataclass(frozen=True)
-class Status:
-    """The status of one diagnostic task; `level` is OK, WARN or ERROR (single bytes)."""
-
-    level: bytes
-    message: str
-    values: Mapping[str, object] = field(default_factory=dict)
-
-
+# Of a diagnostic task: OK, WARN or ERROR (single bytes), what is said, and figures by name.
+Status = tuple[bytes, str, Mapping[str, object]]
 Task = Callable[[], Status]
 
 
@@ -215,16 +207,15 @@ class PaintNode(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         full_name = self.get_fully_qualified_name()
         for name, status_of in self.tasks.items():
-            status = status_of()
-            values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
+            level, words, values = status_of()
             # Aggregators tell two cells apart by the namespace.
             task = f'{full_name.lstrip("/")}: {name}'
+            figures = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
             message.status.append(
                 DiagnosticStatus(
-                    level=status.level, name=task, message=status.message,
-                    hardware_id=full_name, values=values,
+                    level=level, name=task, message=words, hardware_id=full_name, values=figures
                 )
-            )  # fmt: skip
+            )
         self._reports.publish(message)
 
     # --- changes of parameters

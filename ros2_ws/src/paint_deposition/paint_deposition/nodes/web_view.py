@@ -224,5 +224,5 @@ class WebView(PaintNode):
         browsers = len(self.page.browsers)
         values = {'browsers': browsers, 'sent to all of them [kB/s]': f'{rate / 1e3:.0f}'}
         if self._problem:
-            return Status(WARN, self._problem, values)
-        return Status(OK, f'{browsers} browsers on {self.page.url.split("?")[0]}', values)
+            return WARN, self._problem, values
+        return OK, f'{browsers} browsers on {self.page.url.split("?")[0]}', values

@@ -197,7 +197,7 @@ class BagPlayer(PaintNode):
     def status(self) -> Status:
         if self._clock_publisher and self.count_publishers('/clock') > 1:
             jumps = 'another node publishes /clock, too: time jumps for nodes with use_sim_time'
-            return Status(WARN, f'{jumps}; set publish_clock to false for one of them')
+            return WARN, f'{jumps}; set publish_clock to false for one of them', {}
         status = self._flow_control.status if self._time.running else 'paused'
         ahead = self._flow_control.lag(time.monotonic())
         values = {
@@ -206,7 +206,7 @@ class BagPlayer(PaintNode):
             'states published': self.states_published,
             'poses ahead of the slowest subscriber': max(ahead.values(), default=0),
         }
-        return Status(WARN if status.startswith('waiting') else OK, status, values)
+        return WARN if status.startswith('waiting') else OK, status, values
 
     # --- the replay's own thread
 

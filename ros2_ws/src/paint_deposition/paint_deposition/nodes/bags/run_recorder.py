@@ -312,14 +312,14 @@ class RunRecorder(ManagedNode):
 
     def status(self) -> Status:
         if not self.active and self._error is None:
-            return Status(OK, f'inactive; {self.summary()}' if self.runs else 'inactive')
+            return OK, f'inactive; {self.summary()}' if self.runs else 'inactive', {}
         try:
             size, free = self.run.path.stat().st_size, shutil.disk_usage(self.run.folder).free
         except OSError as error:
             reason = f'{self.run.path}: {error.strerror}; nothing more can be recorded there'
             if self._error is None:
                 self._record_failure(RecordingError(reason))
-            return Status(ERROR, reason)
+            return ERROR, reason, {}
         topics = self.recorded.values()
         counts, unnumbered = Counter(self.run.counts), sum(t.unnumbered for t in topics)
         values = {
@@ -331,14 +331,14 @@ class RunRecorder(ManagedNode):
             **{t.name: f'{counts[t.name]} messages, {t.losses}, {t.gaps} gaps' for t in topics},
         }
         if self._error is not None:
-            return Status(ERROR, str(self._error), values)
+            return ERROR, str(self._error), values
         if self._refused:
-            return Status(ERROR, f'not recorded: {" ".join(sorted(self._refused))}', values)
+            return ERROR, f'not recorded: {" ".join(sorted(self._refused))}', values
         if free < 1_000_000_000:
-            return Status(WARN, 'the disk is almost full', values)
+            return WARN, 'the disk is almost full', values
         if self._too_late or any(topic.lost for topic in topics):
-            return Status(WARN, f'messages were missed{self._losses}', values)
-        return Status(OK, 'recording', values)
+            return WARN, f'messages were missed{self._losses}', values
+        return OK, 'recording', values
 
 
 def _summary(run: RunWriter, losses: str) -> str:

@@ -87,26 +87,26 @@ def poses_status(node: PaintingNode, number: int) -> Status:
     if not node.active:
         if source.unpainted:
             words = f'inactive: {source.unpainted} poses came and were not painted'
-            return Status(WARN, words, values)
-        return Status(OK, 'inactive', values)
+            return WARN, words, values
+        return OK, 'inactive', values
     if another := _state_of_another_type(node, source.name):
         node.get_logger().error(another, once=True)
-        return Status(ERROR, another, values)
+        return ERROR, another, values
     if source.refused_frames and time.monotonic() - source.refused_s < 5.0:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
         words = (
             f'{wrong[REFUSED]} poses refused: they are in frame {frames}, the mesh is in '
             f"'{node.frame.frame_id}' and {source.refusal}"
         )
-        return Status(ERROR, words, values)
+        return ERROR, words, values
     warnings = [NO_BRUSH] if gun == NO_BRUSH and counts.received else []
     warnings += sprays_without_poses(source)
     warnings += [f'{count} {words}' for words, count in wrong.items() if count]
     warnings += sorted(source.state_errors)
     if warnings:
-        return Status(WARN, ', '.join(warnings), values)
+        return WARN, ', '.join(warnings), values
     is_silent = time.monotonic() - source.pose_s > SILENT_S
-    return Status(OK, 'waiting for poses' if is_silent else 'painting', values)
+    return OK, 'waiting for poses' if is_silent else 'painting', values
 
 
 def sprays_without_poses(source: AtomizerInput) -> list[str]:
@@ -150,12 +150,12 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
         **more_values,
     }
     if node.model_problem:
-        return Status(WARN, node.model_problem, values)
+        return WARN, node.model_problem, values
     if not all(gun.log.complete for gun in guns):
         limit = f'over {node.values["pose_memory"]} poses (pose_memory)'
-        return Status(WARN, f'{limit}: a new model paints from then on only', values)
+        return WARN, f'{limit}: a new model paints from then on only', values
     if factor > 0.8:
         share = f'painting takes {factor:.0%} of the time that the motion lasts'
         remedy = 'poses may be lost; use a larger max_edge_length_m'
-        return Status(WARN, f'{share}: {remedy}', values)
-    return Status(OK, 'preparing a changed model' if node.repainting else 'up to date', values)
+        return WARN, f'{share}: {remedy}', values
+    return OK, 'preparing a changed model' if node.repainting else 'up to date', values
