@@ -14,7 +14,7 @@ from rosbags.rosbag2 import Reader
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
+from paint_deposition.files.recordings.mcap_run import RunWriter, offered_qos
 from paint_deposition.files.recordings.messages import standard
 
 BOOL = 'std_msgs/msg/Bool'
@@ -25,15 +25,15 @@ QOS_KEYS = {
 }  # fmt: skip
 
 
-def gun_topic(name='/gun', latched=True) -> RunTopic:
-    return RunTopic(name, BOOL, standard(BOOL), [offered_qos(1, latched=latched)])
+def gun_topic(name='/gun', latched=True) -> tuple:
+    return name, BOOL, standard(BOOL), [offered_qos(1, latched=latched)]
 
 
 @pytest.fixture
 def run(tmp_path):
     with RunWriter(tmp_path / 'run', {'mesh_sha256': 'ab12'}, ros_distro='kilted') as writer:
-        writer.add_topic(gun_topic())
-        writer.add_topic(gun_topic('/never', latched=False))
+        writer.add_topic(*gun_topic())
+        writer.add_topic(*gun_topic('/never', latched=False))
         writer.write('/gun', TRUE_CDR, log_time_ns=2_000, publish_time_ns=1_900)
         writer.write('/gun', FALSE_CDR, log_time_ns=5_000, publish_time_ns=4_900)
     return writer.folder
@@ -90,7 +90,7 @@ sys.path.insert(0, sys.argv[2])
 from files.recordings.test_mcap_run import TRUE_CDR, gun_topic
 
 writer = RunWriter(sys.argv[1])
-writer.add_topic(gun_topic())
+writer.add_topic(*gun_topic())
 start_s = time.monotonic()
 number = 0
 while True:
@@ -129,7 +129,7 @@ from paint_deposition.files.recordings.mcap_run import RunWriter
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
 with RunWriter(sys.argv[1], compression='none') as writer:
-    writer.add_topic(gun_topic())
+    writer.add_topic(*gun_topic())
     number = 0
     try:
         while True:

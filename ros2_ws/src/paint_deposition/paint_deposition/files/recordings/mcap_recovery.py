@@ -26,7 +26,7 @@ from rosbags.rosbag2.metadata import parse_qos
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.atomic import require_file, require_small
 from paint_deposition.files.recordings.bag_files import MOST_CHUNK_BYTES, expanded, mcap_files
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.mcap_run import RunWriter
 from paint_deposition.files.recordings.messages import Definition
 
 # Exceptions of the readers on damaged data.
@@ -207,5 +207,5 @@ def _ensure_topic(
     except (ReaderError, KeyError, TypeError, AttributeError):
         qos = []  # damaged; players take their default then
     definition = Definition(text, channel.metadata.get('topic_type_hash', ''), schema.encoding)
-    writer.add_topic(RunTopic(channel.topic, schema.name, definition, qos))
+    writer.add_topic(channel.topic, schema.name, definition, qos)
     return True

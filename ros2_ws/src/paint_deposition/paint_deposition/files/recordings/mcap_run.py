@@ -9,9 +9,9 @@ import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from io import BufferedWriter, FileIO
 from pathlib import Path
+from typing import Any
 
 import yaml
 from mcap.writer import CompressionType, IndexType, Writer
@@ -34,16 +34,6 @@ def offered_qos(depth: int, reliable: bool = True, latched: bool = False) -> Qos
     kept = ros.QosDurability.TRANSIENT_LOCAL if latched else ros.QosDurability.VOLATILE
     forever = ros.QosTime(9223372036, 854775807)
     return Qos(history, depth, sent, kept, forever, forever, liveliness, forever, False)
-
-
-@dataclass(frozen=True)
-class RunTopic:
-    """The metadata of a topic; `qos` are the profiles that its publishers offered."""
-
-    name: str
-    type: str
-    definition: Definition
-    qos: Sequence[Qos] = ()
 
 
 class RunWriter:
@@ -75,7 +65,8 @@ class RunWriter:
         self.counts: dict[str, int] = {}
         self._kept: dict[str, int] = {}
         self.complete = False
-        self._topics: dict[str, RunTopic] = {}
+        # Of each topic, as rosbag2 has it.
+        self._about: dict[str, dict[str, Any]] = {}
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._first_ns = 2**63 - 1
@@ -109,25 +100,30 @@ class RunWriter:
     def message_count(self) -> int:
         return sum(self.counts.values())
 
-    def add_topic(self, topic: RunTopic) -> None:
-        """Add a topic, which is listed in the metadata even without messages."""
-        if topic.name in self._topics:
-            raise RecordingError(f'{topic.name} is already recorded in {self.folder}')
+    def add_topic(
+        self, name: str, message_type: str, definition: Definition, offered: Sequence[Qos] = ()
+    ) -> None:
+        """Add a topic, which is listed in the metadata even without messages.
+
+        ``offered`` are the profiles of its publishers.
+        """
+        if name in self._about:
+            raise RecordingError(f'{name} is already recorded in {self.folder}')
+        qos, type_hash = dump_qos_v9(list(offered)), definition.type_hash
         with self._write_errors():
-            if topic.type not in self._schemas:
-                definition = topic.definition
-                self._schemas[topic.type] = self._writer.register_schema(
-                    topic.type, definition.encoding, definition.text.encode()
+            if message_type not in self._schemas:
+                self._schemas[message_type] = self._writer.register_schema(
+                    message_type, definition.encoding, definition.text.encode()
                 )
-            qos = _yaml(dump_qos_v9(list(topic.qos))).strip()
-            about = {
-                'offered_qos_profiles': qos, 'topic_type_hash': topic.definition.type_hash
-            }  # fmt: skip
-            self._channels[topic.name] = self._writer.register_channel(
-                topic.name, 'cdr', self._schemas[topic.type], about
+            about = {'offered_qos_profiles': _yaml(qos).strip(), 'topic_type_hash': type_hash}
+            self._channels[name] = self._writer.register_channel(
+                name, 'cdr', self._schemas[message_type], about
             )
-        self._topics[topic.name] = topic
-        self.counts[topic.name] = 0
+        self._about[name] = {
+            'name': name, 'type': message_type, 'serialization_format': 'cdr',
+            'offered_qos_profiles': qos, 'type_description_hash': type_hash,
+        }  # fmt: skip
+        self.counts[name] = 0
 
     def write(self, topic: str, cdr: bytes, log_time_ns: int, publish_time_ns: int) -> None:
         """Append a message, with the times at which it was received and sent."""
@@ -213,16 +209,9 @@ class RunWriter:
             'message_count': self.message_count,
         }
         topics = [
-            {
-                'topic_metadata': {
-                    'name': name, 'type': topic.type, 'serialization_format': 'cdr',
-                    'offered_qos_profiles': dump_qos_v9(list(topic.qos)),
-                    'type_description_hash': topic.definition.type_hash,
-                },
-                'message_count': self.counts[name],
-            }
-            for name, topic in self._topics.items()
-        ]  # fmt: skip
+            {'topic_metadata': about, 'message_count': self.counts[name]}
+            for name, about in self._about.items()
+        ]
         return {
             'version': 9, 'storage_identifier': 'mcap', **times,
             'topics_with_message_count': topics, 'compression_format': '', 'compression_mode': '',

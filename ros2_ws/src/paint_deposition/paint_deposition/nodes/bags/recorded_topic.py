@@ -14,8 +14,8 @@ from rosbags.interfaces import (
     QosTime,
 )
 
-from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic
-from paint_deposition.files.recordings.messages import JOINT_TYPE, STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.mcap_run import COMPRESSIONS
+from paint_deposition.files.recordings.messages import JOINT_TYPE, STATE_TYPE, TF_TYPES, Definition
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.managed_node import MANAGED
 from paint_deposition.nodes.parameters import (
@@ -98,7 +98,7 @@ class RecordedTopic(AdaptiveSubscription):
     the run began.
 
     Attributes:
-        run_topic: the topic as the run stores it; name: of the topic.
+        about: what a run stores of the topic, as for `RunWriter.add_topic`; name: of the topic.
         messages: number of messages received, in all runs.
         unnumbered: messages without a sequence number, whose losses cannot be counted.
         gaps, longest_gap_ns: intervals between header stamps above the limit.
@@ -109,13 +109,13 @@ class RecordedTopic(AdaptiveSubscription):
     def __init__(
         self,
         node: Node,
-        run_topic: RunTopic,
+        about: tuple[str, str, Definition, Sequence[Qos]],
         take: Callable[[str, bytes, int, int], None],
         max_gap_ns: int | None,
         begun_ns: int,
         depth: int,
     ) -> None:
-        self.run_topic, self.name = run_topic, run_topic.name
+        self.about, self.name = about, about[0]
         self.messages = self._log_time_ns = self.sent_ns = 0
         # How each publisher was first heard: number of the message, when it was sent, and how
         # long after the begin of the run; and how many came before, by its rate.
@@ -124,7 +124,7 @@ class RecordedTopic(AdaptiveSubscription):
         self._pass_on, self._max_gap_ns = take, max_gap_ns
         self.reset_counts(begun_ns)
         super().__init__(
-            node, message_class(run_topic.type), self.name, self._record, depth=depth,
+            node, message_class(about[1]), self.name, self._record, depth=depth,
             latched=True, raw=True, polled=False,
         )  # fmt: skip
 

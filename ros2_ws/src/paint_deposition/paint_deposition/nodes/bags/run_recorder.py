@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import messages as definitions
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.mcap_run import RunWriter
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.bags.initial_messages import TF, InitialMessages
@@ -141,10 +141,10 @@ class RunRecorder(ManagedNode):
                 if name in self.recorded:
                     self.recorded[name].match_qos()
                     continue
-                run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
-                self._guarded(self.run.add_topic, run_topic)
+                about = name, types[0], definitions.installed(types[0]), offered
+                self._guarded(self.run.add_topic, *about)
                 self.recorded[name] = RecordedTopic(
-                    self, run_topic, self._write, max_gap_ns, self._begun_ns,
+                    self, about, self._write, max_gap_ns, self._begun_ns,
                     depth=5000 if types[0] in MOTION_TYPES else 100,
                 )  # fmt: skip
             except RecordingError as error:
@@ -177,7 +177,7 @@ class RunRecorder(ManagedNode):
             self._too_late += 1
             return
         if name not in self.leaving.counts:
-            self.leaving.add_topic(self.recorded[name].run_topic)
+            self.leaving.add_topic(*self.recorded[name].about)
         before_ns = self._initial_messages.begin_ns - 1
         self.leaving.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
         self.leaving.keep_another(name)
@@ -239,7 +239,7 @@ class RunRecorder(ManagedNode):
         self.run, self._begun_ns = run, time.time_ns()
         for topic in self.recorded.values():
             topic.reset_counts(self._begun_ns)
-            run.add_topic(topic.run_topic)
+            run.add_topic(*topic.about)
         for message in self._initial_messages.begin_run(log_time_ns):
             if message.topic in run.counts:
                 run.write(*message[:4])
