@@ -54,6 +54,7 @@ class AtomizerInput:
         refused_s, pose_s: monotonic times of the last pose refused and of the last one received.
         spraying: whether the gun sprays, by the newest state; False before the first.
         speed: of the TCP now; programmed_m_per_s: by the newest state, 0 or NaN: unknown.
+        topics: the subscriptions, which count what the middleware has lost since the last reset.
         tf_queue: poses that wait for their transform.
         refused_frames: poses refused for their frame, by frame; refusal: reason of the last.
         unpainted: poses received while the node was not active.
@@ -86,7 +87,7 @@ class AtomizerInput:
         self.tf_queue: TfQueue = deque()
         self.times_s: deque[tuple[float, float]] = deque(maxlen=100)
         subscribe = partial(AdaptiveSubscription, node, depth=node.values['pose_queue_depth'])
-        self._topics = [
+        self.topics = [
             subscribe(
                 PoseStamped, self._pose_topic,
                 lambda pose, info: self._new_poses.append((pose, info['source_timestamp'])),
@@ -106,11 +107,6 @@ class AtomizerInput:
         node.create_steady_timer(0.02, partial(self.take_pending, at_once=False))
         node.create_steady_timer(0.2, self._report_progress)
 
-    @property
-    def messages_lost(self) -> int:
-        """Messages that the middleware has lost since the last reset."""
-        return sum(topic.lost for topic in self._topics)
-
     def reset(self) -> None:
         """Reset the counts; poses that were not painted yet are dropped."""
         self.reset_counts()
@@ -127,7 +123,7 @@ class AtomizerInput:
         self.anomalies: Counter[str] = Counter()
         self.state_errors: set[str] = set()
         self.unpainted = 0
-        for topic in self._topics:
+        for topic in self.topics:
             topic.lost = 0
         self.steps = StreamSteps()
 
@@ -167,7 +163,7 @@ class AtomizerInput:
 
         They are painted at once, or when they fill a batch or have waited for long enough.
         """
-        for topic in (*self._node.frame.tf_topics, *self._topics):
+        for topic in (*self._node.frame.tf_topics, *self.topics):
             topic.take_pending()
         # Latched states may come behind others that were sent later.
         poses, states = [*self._new_poses], sorted(self._new_states, key=itemgetter(1))
@@ -175,13 +171,22 @@ class AtomizerInput:
         self._new_states.clear()
         # Poses stay in the order in which they came.
         for message, sent_ns in merge(poses, states, key=itemgetter(1)):
+            ns = stamp_ns(message.header)
             if isinstance(message, PoseStamped):
-                self._note_pose(message, sent_ns)
-            else:
-                state_ns = stamp_ns(message.header)
-                # Before its poses after a pause, too: the next pose tells.
-                if self._newest is None or state_ns - stamp_ns(self._newest.header) > AHEAD_NS:
-                    self._state_ahead = state_ns, sent_ns
+                self.poses_received += 1
+                if len(message.header.frame_id) > LONGEST_NAME:
+                    message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
+                self._newest, self.sent_ns, self.pose_s = message, sent_ns, time.monotonic()
+                if self._state_ahead and sent_ns > self._state_ahead[1]:
+                    if self._state_ahead[0] - ns > AHEAD_NS:
+                        ahead = 'states stamped over 1 s ahead of the poses sent after them'
+                        self.anomalies[f'{ahead}: set the clocks'] += 1
+                    self._state_ahead = None
+                if self.poses_received % POSES_PER_BATCH == 0:
+                    self._report_progress()
+            # Before its poses after a pause, too: the next pose tells.
+            elif self._newest is None or ns - stamp_ns(self._newest.header) > AHEAD_NS:
+                self._state_ahead = ns, sent_ns
             self._process(message, sent_ns)
 
         has_waited = time.monotonic() - self._flushed_s >= 0.05
@@ -226,20 +231,6 @@ class AtomizerInput:
         self.unpainted += len(batch)
 
     # --- poses
-
-    def _note_pose(self, message: PoseStamped, sent_ns: int) -> None:
-        self.poses_received += 1
-        if len(message.header.frame_id) > LONGEST_NAME:
-            message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
-        self._newest, self.sent_ns = message, sent_ns
-        if self._state_ahead and sent_ns > self._state_ahead[1]:
-            if self._state_ahead[0] - stamp_ns(message.header) > AHEAD_NS:
-                ahead = 'states stamped over 1 s ahead of the poses sent after them'
-                self.anomalies[f'{ahead}: set the clocks'] += 1
-            self._state_ahead = None
-        self.pose_s = time.monotonic()
-        if self.poses_received % POSES_PER_BATCH == 0:
-            self._report_progress()
 
     def _place(self) -> None:
         """Put the poses whose transforms are known into the next batch."""

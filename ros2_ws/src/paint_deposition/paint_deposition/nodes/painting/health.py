@@ -55,7 +55,7 @@ def what_was_wrong(source: AtomizerInput, film: LiveFilm) -> dict[str, int]:
         **{words: getattr(film.counts, name) for name, (words, _) in COUNTS.items()},
         'steps faster than a robot': source.steps.jumps,
         **source.anomalies,
-        LOST: source.messages_lost,
+        LOST: sum(topic.lost for topic in source.topics),
         REFUSED: source.refused_frames.total(),
     }
 
