@@ -317,21 +317,17 @@ def _handle_signals(action: Callable[[int, object], None] | signal.Handlers) -> 
 
 
 def _create_node(make_node: Callable[[], PaintNode]) -> PaintNode:
+    step = 'ROS arguments'
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:
-        raise PaintError(f'ROS arguments: {_reason(error)}') from None
-    try:
+        step = 'ROS cannot make the node'
         return make_node()
     except RuntimeError as error:
         # RCLError is not public. Causes: security without keys or libraries, an invalid name.
-        if type(error).__name__ != 'RCLError':
+        if step != 'ROS arguments' and type(error).__name__ != 'RCLError':
             raise
-        raise PaintError(f'ROS cannot make the node: {_reason(error)}') from None
-
-
-def _reason(error: RuntimeError) -> str:
-    return ' '.join(str(error).split(', at /')[0].split())
+        reason = ' '.join(str(error).split(', at /')[0].split())
+        raise PaintError(f'{step}: {reason}') from None
 
 
 def _report_error(error: Exception) -> int:

@@ -8,7 +8,7 @@ import json
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from io import BufferedWriter, FileIO
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ def offered_qos(depth: int, reliable: bool = True, latched: bool = False) -> Qos
     return Qos(history, depth, sent, kept, forever, forever, liveliness, forever, False)
 
 
-class RunWriter:
+class RunWriter(AbstractContextManager):
     """Writes serialised messages into a new run folder.
 
     A live recorder calls `close_old_chunk` a few times a second, so that a killed process loses
@@ -175,9 +175,6 @@ class RunWriter:
     def abandon(self) -> None:
         """Close the file as it is; the run stays unfinished."""
         self._raw.close()
-
-    def __enter__(self) -> 'RunWriter':
-        return self
 
     def __exit__(self, exception_type: type[BaseException] | None, *_: object) -> None:
         if exception_type is None:
