@@ -180,8 +180,8 @@ def test_a_bag_that_breaks_off_later_ends_the_process(ros_domain, listen, wait_u
     path.write_bytes(content)
     listen()
     with NodeProcess(tmp_path / 'player', 'bag_player', bag=bag, rate='0.0') as process:
-        wait_until(lambda: process.exit_code is not None, what='the end')
-        assert process.exit_code == 2, process.err
+        wait_until(lambda: process.poll() is not None, what='the end')
+        assert process.returncode == 2, process.err
         assert f'run: paint recover {bag}' in process.err
 
 

@@ -162,7 +162,7 @@ class ModelComparison(PaintingNode):
         self._mesh_publisher.publish(self._mesh(stamp_ns, scale.palette, rows))
 
     def _publish_legend(self) -> None:
-        bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
+        bar = legend(self._scale, self.surface, self.frame.frame_id)
         self._legend_publisher.publish(bar)
 
     def _compare(self) -> Trigger.Response:

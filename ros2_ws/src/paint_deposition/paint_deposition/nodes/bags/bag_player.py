@@ -212,32 +212,29 @@ class BagPlayer(PaintNode):
 
     def _replay(self) -> None:
         while not self.stopped.is_set():
-            self._play_once()
+            begun = False
+            with open_bag(self.values['bag']) as bag:
+                for message in self._messages(bag):
+                    if not begun:
+                        begun = True
+                        self._time.change(started=False, time_ns=message.log_time_ns)
+                        self._flow_control.wait_for_subscribers(self._subscribers_to_await)
+                        self._subscribers_to_await = 0  # when looping
+                        self._time.change(started=True)
+                    # Wait for the end of a pause, the time of the message, and the flow control.
+                    self._time.wait_for(message.log_time_ns, self.stopped)
+                    if self.values['rate'] == 0.0:
+                        self._flow_control.wait_for_lag_below(self.values['window'])
+                        self._time.change(time_ns=message.log_time_ns)
+                    if self.stopped.is_set():
+                        break
+                    self._publish(message, bag)
+            self._time.change(started=False)
+            self._publish_clock()
             self._flow_control.wait_until_taken()
             if not self.values['loop']:
                 break
         self.finish()
-
-    def _play_once(self) -> None:
-        begun = False
-        with open_bag(self.values['bag']) as bag:
-            for message in self._messages(bag):
-                if not begun:
-                    begun = True
-                    self._time.change(started=False, time_ns=message.log_time_ns)
-                    self._flow_control.wait_for_subscribers(self._subscribers_to_await)
-                    self._subscribers_to_await = 0  # when looping
-                    self._time.change(started=True)
-                # Wait for the end of a pause, the time of the message, and the flow control.
-                self._time.wait_for(message.log_time_ns, self.stopped)
-                if self.values['rate'] == 0.0:
-                    self._flow_control.wait_for_lag_below(self.values['window'])
-                    self._time.change(time_ns=message.log_time_ns)
-                if self.stopped.is_set():
-                    return
-                self._publish(message, bag)
-        self._time.change(started=False)
-        self._publish_clock()
 
     def _messages(self, bag: Bag) -> Iterator[RawMessage]:
         """Poses, states and transforms by log time; at equal times, poses last."""

@@ -268,7 +268,7 @@ class FilmDisplay:
         ends = self._scale.low, self._scale.high
         if ends != self._legend_ends:
             self._legend_ends = ends
-            self._legend.publish(legend(self._scale, 'µm', node.surface, at.frame_id))
+            self._legend.publish(legend(self._scale, node.surface, at.frame_id))
 
     def _mesh_message(self, frame_id: str) -> bytes:
         surface = self._node.surface
@@ -279,8 +279,8 @@ class FilmDisplay:
         return self._mesh(self._node.film.newest_ns or 0, self._scale.palette, rows)
 
 
-def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> MarkerArray:
-    """A bar in the scale's colours with values beside it, upright at the side of the part."""
+def legend(scale: ColourScale, surface: Surface, frame_id: str) -> MarkerArray:
+    """A bar in the scale's colours with values [um] beside it, upright at the side of the part."""
     across = across_axis(surface.outward, surface.down)
     up = -downhill_axis(surface.outward, surface.down)
     heights, widths = surface.vertices_m @ up, surface.vertices_m @ across
@@ -300,7 +300,7 @@ def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> Ma
     markers = [bar]
     for number, share in enumerate(np.linspace(0.0, 1.0, 5), start=1):
         label = white_marker(Marker.TEXT_VIEW_FACING, 'legend', number, frame_id)
-        label.text = f'{scale.low + (scale.high - scale.low) * share:g} {unit}'
+        label.text = f'{scale.low + (scale.high - scale.low) * share:g} µm'
         label.scale = Vector3(z=0.04 * size)
         label.pose.position = _point(corner + share * size * up + 0.1 * size * across)
         markers.append(label)
