@@ -65,7 +65,7 @@ class ModelComparison(PaintingNode):
         self._stats_publisher = latched(ComparisonStats, 'comparison/stats')
         self._legend_publisher = latched(MarkerArray, 'comparison/legend')
         self.create_service(Trigger, '~/compare', lambda *_: self._compare())
-        self._publish_legend()
+        self._legend_publisher.publish(legend(self._scale, self.surface, self.frame.frame_id))
         self.publish()
         return painting_tasks(self) | {'comparison': self.status}
 
@@ -116,7 +116,8 @@ class ModelComparison(PaintingNode):
     def _on_change(self, names: set[str]) -> None:
         super()._on_change(names)
         if 'color_max_um' in names:
-            self._publish_legend()
+            bar = legend(self._scale, self.surface, self.frame.frame_id)
+            self._legend_publisher.publish(bar)
         self._shown = None
 
     # --- publishing
@@ -160,10 +161,6 @@ class ModelComparison(PaintingNode):
         scale = self._scale
         rows = scale.rows(self._spreading @ at_points, self._coloured)
         self._mesh_publisher.publish(self._mesh(stamp_ns, scale.palette, rows))
-
-    def _publish_legend(self) -> None:
-        bar = legend(self._scale, self.surface, self.frame.frame_id)
-        self._legend_publisher.publish(bar)
 
     def _compare(self) -> Trigger.Response:
         """The comparison in one line."""

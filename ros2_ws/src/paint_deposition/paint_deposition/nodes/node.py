@@ -184,8 +184,9 @@ class PaintNode(Node):
 
     def _files_of(self, values: Mapping[str, Any]) -> list[str]:
         """The paths that parameters hold."""
-        rows = self.PARAMETERS
-        held = [values[name] for name in values.keys() & rows.keys() if rows[name].is_path]
+        rows = self.PARAMETERS.items()
+        paths = {name for name, row in rows if row.description.endswith('[path]')}
+        held = [values[name] for name in values.keys() & paths]
         return [file for each in held for file in np.atleast_1d(each).tolist() if file]
 
     # --- diagnostics
@@ -278,7 +279,8 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
         PaintNode.end_if_loading()
 
     try:
-        _handle_signals(on_signal)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, on_signal)
         if received:
             return 0
         node = _create_node(make_node)
@@ -299,7 +301,8 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
     finally:
         # Python restores the default action of its own handlers while it exits, and a second
         # SIGINT would then kill it; an ignored signal stays ignored.
-        _handle_signals(signal.SIG_IGN)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
     try:
         if node is not None:
             node.close()
@@ -309,11 +312,6 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
     finally:
         rclpy.try_shutdown()
     return exit_code
-
-
-def _handle_signals(action: Callable[[int, object], None] | signal.Handlers) -> None:
-    signal.signal(signal.SIGINT, action)
-    signal.signal(signal.SIGTERM, action)
 
 
 def _create_node(make_node: Callable[[], PaintNode]) -> PaintNode:

@@ -49,6 +49,10 @@ class RunWriter(AbstractContextManager):
         custom_data: text by name, kept in `metadata.yaml` and in the file (mesh hash, model).
         compression: a key of COMPRESSIONS.
         ros_distro: default is the environment's ROS_DISTRO.
+
+    Attributes:
+        counts: messages by topic.
+        kept: how many of them, the first, are of the part of this run, where not all are.
     """
 
     def __init__(
@@ -63,7 +67,7 @@ class RunWriter(AbstractContextManager):
         self.custom_data = {key: str(value) for key, value in (custom_data or {}).items()}
         self.ros_distro = ros_distro or os.environ.get('ROS_DISTRO', 'unknown')
         self.counts: dict[str, int] = {}
-        self._kept: dict[str, int] = {}
+        self.kept: dict[str, int] = {}
         self.complete = False
         # Of each topic, as rosbag2 has it.
         self._about: dict[str, dict[str, Any]] = {}
@@ -146,16 +150,6 @@ class RunWriter(AbstractContextManager):
                 self._writer.flush()
             self._chunk_opened_s = None
 
-    def keep(self, counts: Mapping[str, int]) -> None:
-        """Readers are to take so many messages of these topics, the first; the rest is not its."""
-        self._kept |= counts
-        if self._kept:
-            self.custom_data[KEPT] = ' '.join(f'{name}={n}' for name, n in self._kept.items())
-
-    def keep_another(self, topic: str) -> None:
-        """One more message of a topic is kept, if not all are."""
-        self.keep({topic: self._kept[topic] + 1} if topic in self._kept else {})
-
     def finish(self) -> Path:
         """Complete the run and return its folder."""
         if self.complete:
@@ -209,12 +203,14 @@ class RunWriter(AbstractContextManager):
             {'topic_metadata': about, 'message_count': self.counts[name]}
             for name, about in self._about.items()
         ]
+        kept = ' '.join(f'{name}={count}' for name, count in self.kept.items())
         return {
             'version': 9, 'storage_identifier': 'mcap', **times,
             'topics_with_message_count': topics, 'compression_format': '', 'compression_mode': '',
             'relative_file_paths': [self.path.name],
             'files': [{'path': self.path.name, **times}],
-            'custom_data': self.custom_data, 'ros_distro': self.ros_distro,
+            'custom_data': self.custom_data | ({KEPT: kept} if kept else {}),
+            'ros_distro': self.ros_distro,
         }  # fmt: skip
 
 

@@ -180,7 +180,8 @@ class RunRecorder(ManagedNode):
             self.leaving.add_topic(*self.recorded[name].about)
         before_ns = self._initial_messages.begin_ns - 1
         self.leaving.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
-        self.leaving.keep_another(name)
+        if name in self.leaving.kept:
+            self.leaving.kept[name] += 1
         self._leaves_s = time.monotonic() + LATE_S
 
     def _has_left(self, leaving: RunWriter) -> bool:
@@ -224,7 +225,8 @@ class RunRecorder(ManagedNode):
             self._end_of_leaving()
             # Some messages were sent for this part, and are in the run before, too.
             self._left_ns, early = self._initial_messages.begin_part(part, sent_ns)
-            self.run.keep({name: self.run.counts[name] - count for name, count in early.items()})
+            counts = self.run.counts
+            self.run.kept |= {name: counts[name] - count for name, count in early.items()}
             self.leaving, self._lost_of_leaving = self.run, self._losses
             self._leaves_s = time.monotonic() + LATE_S
             self._begin_run(new_run, log_time_ns)

@@ -171,22 +171,23 @@ class AtomizerInput:
         self._new_states.clear()
         # Poses stay in the order in which they came.
         for message, sent_ns in merge(poses, states, key=itemgetter(1)):
-            ns = stamp_ns(message.header)
             if isinstance(message, PoseStamped):
                 self.poses_received += 1
                 if len(message.header.frame_id) > LONGEST_NAME:
                     message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
                 self._newest, self.sent_ns, self.pose_s = message, sent_ns, time.monotonic()
                 if self._state_ahead and sent_ns > self._state_ahead[1]:
-                    if self._state_ahead[0] - ns > AHEAD_NS:
+                    if self._state_ahead[0] - stamp_ns(message.header) > AHEAD_NS:
                         ahead = 'states stamped over 1 s ahead of the poses sent after them'
                         self.anomalies[f'{ahead}: set the clocks'] += 1
                     self._state_ahead = None
                 if self.poses_received % POSES_PER_BATCH == 0:
                     self._report_progress()
-            # Before its poses after a pause, too: the next pose tells.
-            elif self._newest is None or ns - stamp_ns(self._newest.header) > AHEAD_NS:
-                self._state_ahead = ns, sent_ns
+            else:
+                state_ns = stamp_ns(message.header)
+                # Before its poses after a pause, too: the next pose tells.
+                if self._newest is None or state_ns - stamp_ns(self._newest.header) > AHEAD_NS:
+                    self._state_ahead = state_ns, sent_ns
             self._process(message, sent_ns)
 
         has_waited = time.monotonic() - self._flushed_s >= 0.05

@@ -75,7 +75,9 @@ class PaintingNode(ManagedNode, ABC):
             source.take_pending()
 
     def _cleanup(self) -> None:
-        self._abort_repainting()
+        if self.repainting is not None:
+            self.repainting.cancel()
+            self.repainting = None
 
     def _load_files(self) -> None:
         self.gun_names: list[str] = self.values['atomizers'] or ['']
@@ -225,7 +227,8 @@ class PaintingNode(ManagedNode, ABC):
 
         Painting goes on meanwhile, in the films and their logs as they are.
         """
-        self._abort_repainting()
+        if self.repainting is not None:
+            self.repainting.cancel()
         surface, points, models = self.surface, self.points, self.models
         logs = [gun.log for gun in self.film.guns]
         prepared: Future[LiveFilms] = Future()
@@ -252,11 +255,6 @@ class PaintingNode(ManagedNode, ABC):
 
         self.repainting, self._repainted_logs = prepared, logs if from_start else None
         threading.Thread(target=work, name='repainting', daemon=True).start()
-
-    def _abort_repainting(self) -> None:
-        if self.repainting is not None:
-            self.repainting.cancel()
-            self.repainting = None
 
     def _update(self) -> None:
         """Adopt a repainted film, and turn the part inside out if the guns point at its back."""
