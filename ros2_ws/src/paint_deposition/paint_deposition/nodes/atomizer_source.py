@@ -20,7 +20,7 @@ from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.nodes.frames import QUEUE_DEPTH, SILENT_S, JointPoses, TfPoses
-from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status
+from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
 from paint_deposition.nodes.topics import (
     POSE_DEPTH,
@@ -102,41 +102,6 @@ class AtomizerSource(PaintNode):
         ),
     )
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
-        self._state_publisher = self.create_publisher(
-            AtomizerState, 'atomizer/state', LATCHED_STATES
-        )
-        # Topics that have no publisher yet, with their callbacks; joints may be signals, too.
-        self._missing: set[tuple[str, Callable[..., None]]] = {
-            (signal.topic, self._on_signal_message) for signal in self._signals.values()
-        }
-        self._values: dict[str, float] = {}
-        self._published, self._newest_ns = '', 0
-        self.poses_published = 0
-        # Of the robot's poses: their frame, when the last came, and how late they are sent.
-        self._base, self._pose_s, self._clock_offset_s = '', time.monotonic(), 0.0
-        # What computes the poses; None beside a robot that publishes them itself.
-        self._motion: JointPoses | TfPoses | None = None
-        base, joints = self.values['base_link'], self.values['joint_topic']
-        if self._robot is not None:
-            self._motion = JointPoses(self._robot, joints, self._publish_pose)
-            self._missing.add((joints, self._motion.take))
-        elif base:
-            tip = self.values['tip_link'] or DEFAULT_TIP
-            self._motion = TfPoses(self, base, tip, self._publish_pose)
-        if self._motion is None:
-            self.create_subscription(PoseStamped, POSES, self._watch_pose, qos_profile_sensor_data)
-        else:
-            self._base, depth = self._motion.base, QoSProfile(depth=POSE_DEPTH)
-            self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
-        self._problems: dict[str, str] = {}  # by topic
-        self._heard: list[AdaptiveSubscription] = []
-        if isinstance(self._motion, TfPoses):
-            self._heard += self._motion.topics
-        self.create_steady_timer(0.1, self._discover_topics)
-        self.report({'robot': self._robot_status, 'signals': self._signals_status})
-
     def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         if not any(values[name] for name in ('urdf_file', 'base_link', 'trigger')):
             raise PaintError(
@@ -151,7 +116,7 @@ class AtomizerSource(PaintNode):
             if values[name] and Signal.parse(values[name]) is None:
                 raise PaintError(f"{name} is '{values[name]}': give {SIGNAL}")
 
-    def _load_files(self) -> None:
+    def _configure(self) -> Mapping[str, Task]:
         values = self.values
         self._robot = None
         if values['urdf_file']:
@@ -163,6 +128,38 @@ class AtomizerSource(PaintNode):
         self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         named = {name: Signal.parse(values[name]) for name in SIGNALS}
         self._signals = {name: signal for name, signal in named.items() if signal is not None}
+        self._state_publisher = self.create_publisher(
+            AtomizerState, 'atomizer/state', LATCHED_STATES
+        )
+        # Topics that have no publisher yet, with their callbacks; joints may be signals, too.
+        self._missing: set[tuple[str, Callable[..., None]]] = {
+            (signal.topic, self._on_signal_message) for signal in self._signals.values()
+        }
+        self._values: dict[str, float] = {}
+        self._published, self._newest_ns = '', 0
+        self.poses_published = 0
+        # Of the robot's poses: their frame, when the last came, and how late they are sent.
+        self._base, self._pose_s, self._clock_offset_s = '', time.monotonic(), 0.0
+        # What computes the poses; None beside a robot that publishes them itself.
+        self._motion: JointPoses | TfPoses | None = None
+        base, joints = values['base_link'], values['joint_topic']
+        if self._robot is not None:
+            self._motion = JointPoses(self._robot, joints, self._publish_pose)
+            self._missing.add((joints, self._motion.take))
+        elif base:
+            tip = values['tip_link'] or DEFAULT_TIP
+            self._motion = TfPoses(self, base, tip, self._publish_pose)
+        if self._motion is None:
+            self.create_subscription(PoseStamped, POSES, self._watch_pose, qos_profile_sensor_data)
+        else:
+            self._base, depth = self._motion.base, QoSProfile(depth=POSE_DEPTH)
+            self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
+        self._problems: dict[str, str] = {}  # by topic
+        self._heard: list[AdaptiveSubscription] = []
+        if isinstance(self._motion, TfPoses):
+            self._heard += self._motion.topics
+        self.create_steady_timer(0.1, self._discover_topics)
+        return {'robot': self._robot_status, 'signals': self._signals_status}
 
     # --- poses
 

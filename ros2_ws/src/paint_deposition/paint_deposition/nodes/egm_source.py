@@ -3,6 +3,7 @@
 import socket
 import time
 from collections import deque
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
@@ -12,7 +13,7 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status
+from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed
 from paint_deposition.nodes.topics import POSE_DEPTH, header, pose_message
 
@@ -204,16 +205,6 @@ class EgmSource(PaintNode):
         ),
     )  # fmt: skip
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
-        profile = QoSProfile(depth=POSE_DEPTH)
-        self._poses = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
-        self._joints = self.create_publisher(JointState, 'joint_states', profile)
-        self.stream = EgmStream(round(1e9 * self.values['lag_s']))
-        self._heard_s, self._lacks = time.monotonic(), ''
-        self.report({'robot': self.status})
-        self.start_thread(self._listen)
-
     def _validate(self, values: Any, changed: set[str]) -> None:
         egm_message()
         if len(values['external_joints']) != len(values['external_scales']):
@@ -222,7 +213,7 @@ class EgmSource(PaintNode):
                 f'{len(values["external_scales"])} external_scales; give one scale a joint'
             )
 
-    def _load_files(self) -> None:
+    def _configure(self) -> Mapping[str, Task]:
         address = self.values['address'], self.values['port']
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -234,6 +225,13 @@ class EgmSource(PaintNode):
                 'what else listens there, or give another port'
             ) from None
         self._socket.settimeout(0.2)
+        profile = QoSProfile(depth=POSE_DEPTH)
+        self._poses = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
+        self._joints = self.create_publisher(JointState, 'joint_states', profile)
+        self.stream = EgmStream(round(1e9 * self.values['lag_s']))
+        self._heard_s, self._lacks = time.monotonic(), ''
+        self.start_thread(self._listen)
+        return {'robot': self.status}
 
     def close(self) -> None:
         super().close()

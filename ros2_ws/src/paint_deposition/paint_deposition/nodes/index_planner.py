@@ -20,7 +20,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes import topics
-from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.painting.painting_parameters import (
     model_from_parameters,
     model_parameters,
@@ -74,8 +74,11 @@ class IndexPlanner(PaintNode):
         ),
     )
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
+    def _configure(self) -> Mapping[str, Task]:
+        self._model = model_from_parameters(self.values)
+        self._path_publisher = self.create_publisher(Path, 'planned_path', topics.LATCHED)
+        if self.values['mesh_file']:
+            self._plan({})
         self._requests = 0
         self._last = OK, 'no request yet'
         self.create_service(RecommendIndex, 'recommend_index', self._recommend)
@@ -86,13 +89,7 @@ class IndexPlanner(PaintNode):
             callback_group=ReentrantCallbackGroup(),
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )  # fmt: skip
-        self.report({'index': self.status})
-
-    def _load_files(self) -> None:
-        self._model = model_from_parameters(self.values)
-        self._path_publisher = self.create_publisher(Path, 'planned_path', topics.LATCHED)
-        if self.values['mesh_file']:
-            self._plan({})
+        return {'index': self.status}
 
     def close(self) -> None:
         """Cancel the goal that is under way, and destroy the action server."""

@@ -1,13 +1,12 @@
 """Managed (lifecycle) nodes, which can also configure and activate themselves."""
 
-from collections.abc import Mapping
 from functools import partialmethod
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.node import ERROR, OK, PaintNode, Status, Task
+from paint_deposition.nodes.node import ERROR, OK, PaintNode, Status
 from paint_deposition.nodes.parameters import NodeParameter, ParameterTable, fixed
 
 MANAGED = fixed(
@@ -57,14 +56,6 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         self.autostarting = False
 
     # --- for the subclass
-
-    def _configure(self) -> Mapping[str, Task]:
-        """Create what the configured node has, whose files have been read.
-
-        Returns:
-            Its diagnostic tasks, by name.
-        """
-        return {}
 
     def _activate(self) -> None:
         """Start working."""
@@ -135,8 +126,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
                 self._activate()
             else:
                 self._lasting = before
-                super()._start()
-                self.tasks = {**self._configure(), 'state': self._state_status}
+                self.tasks = {**self._load(), 'state': self._state_status}
         except BaseException:
             self._created.pop()
             self._destroy(self._entities - before)

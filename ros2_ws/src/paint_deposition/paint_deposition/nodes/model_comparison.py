@@ -59,6 +59,12 @@ class ModelComparison(PaintingNode):
     PRECISION = 'double'
 
     def _configure(self) -> Mapping[str, Task]:
+        if not self.values['measurements_file']:
+            raise PaintError('model_comparison: measurements_file is empty: give gauge readings')
+        self._is_read = False
+        self.readings = read_readings(self.values['measurements_file'])
+        self.get_logger().info(self.readings.understood)
+        self._noise = gauge_noise(self.readings)
         super()._configure()
         latched = partial(self.create_publisher, qos_profile=topics.LATCHED)
         self._mesh_publisher = latched(Marker, 'comparison/mesh')
@@ -70,15 +76,6 @@ class ModelComparison(PaintingNode):
         return painting_tasks(self) | {'comparison': self.status}
 
     # --- the part and its readings
-
-    def _load_files(self) -> None:
-        if not self.values['measurements_file']:
-            raise PaintError('model_comparison: measurements_file is empty: give gauge readings')
-        self._is_read = False
-        self.readings = read_readings(self.values['measurements_file'])
-        self.get_logger().info(self.readings.understood)
-        self._noise = gauge_noise(self.readings)
-        super()._load_files()
 
     def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
         motionless = SprayPath.empty()

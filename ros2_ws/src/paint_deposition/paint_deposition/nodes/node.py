@@ -77,17 +77,22 @@ class PaintNode(Node):
             self._validate(self.values, set())
             self._start()
         except PaintError:
-            # The subclass is not constructed yet: it has nothing of its own to destroy.
+            # The subclass is not configured yet: it has nothing of its own to destroy.
             super().destroy_node()
             raise
         self.add_on_set_parameters_callback(self._on_set_parameters)
 
     def _start(self) -> None:
-        """Read the files; SIGINT and SIGTERM interrupt it."""
+        """Configure the node, and report what it does."""
+        if tasks := self._load():
+            self.report(tasks)
+
+    def _load(self) -> Mapping[str, Task]:
+        """Configure the node; SIGINT and SIGTERM interrupt it."""
         PaintNode.loading = True
         PaintNode.end_if_loading()
         try:
-            self._load_files()
+            return self._configure()
         finally:
             PaintNode.loading = False
 
@@ -108,8 +113,16 @@ class PaintNode(Node):
         ``changed`` has the names of those that change in a node whose files have been read.
         """
 
-    def _load_files(self) -> None:
-        """Read the files named in ``self.values``; a PaintError ends the node."""
+    def _configure(self) -> Mapping[str, Task]:
+        """Read the files named in ``self.values``, and create topics, services and the like.
+
+        Returns:
+            The diagnostic tasks, by name.
+
+        Raises:
+            PaintError: the files cannot be used; the node ends, or waits for others.
+        """
+        return {}
 
     def _on_change(self, names: set[str]) -> None:
         """Apply the changes of these parameters; ``self.values`` has the new values."""

@@ -23,7 +23,7 @@ from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.transforms import PART_POSE_TOPIC, NoTransform
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.frames import PartFrame, TfQueue, placed_in_order
-from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.parameters import (
     DISPLAY,
@@ -64,9 +64,28 @@ class WebView(PaintNode):
         )
     )
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
-        results, compared = topics.RESULTS, partial(setattr, self, '_comparison')
+    def _configure(self) -> Mapping[str, Task]:
+        values, results = self.values, topics.RESULTS
+        names = values['atomizers'] or ['']
+        self.scene = Scene()
+        self._frame = PartFrame(self, values['frame_id'])
+        self._flow: dict[str, float] = {}
+        # The simulator, which cannot paint a pose without a transform, says why.
+        self._waiting: dict[str, TfQueue] = {name: deque() for name in names}
+        # Stamp of the newest figures; their time, which goes on where a stream is restarted.
+        self._newest_ns, self._time_s = 0, 0.0
+        self._comparison = ComparisonStats(rmse_um=math.nan)
+        # What makes the film doubtful, '' if nothing does, and when the simulator said so.
+        self._doubts, self._trusted_s = '', time.monotonic()
+        self._problem = ''
+        self._sent = 0, time.monotonic()
+        self._show_part(values['mesh_file'])
+        token = os.environ.get(TOKEN, '')
+        self.page = Page(self.scene, values['host'], values['port'], token)
+        # Not to the log, which is published.
+        sys.stdout.write(f'the page is at {self.page.url}\n')
+        sys.stdout.flush()
+        compared = partial(setattr, self, '_comparison')
         for message, topic, take, profile in (
             (Part, topics.PART_TOPIC, self._take_part, topics.LATCHED),
             (TransformStamped, PART_POSE_TOPIC, self._take_part_pose, topics.LATCHED),
@@ -81,7 +100,7 @@ class WebView(PaintNode):
                 self, message, gun_topic(name, topic), partial(self._take_input, name), depth=500,
                 latched=message is AtomizerState,
             )
-            for name in self.values['atomizers'] or ['']
+            for name in names
             for message, topic in (
                 (AtomizerState, 'atomizer/state'), (PoseStamped, 'atomizer/pose'),
             )
@@ -89,30 +108,7 @@ class WebView(PaintNode):
         # At 1 kHz fifty poses wait at most.
         self.create_steady_timer(0.05, self._take_motion)
         self.create_steady_timer(0.5, self._show_trust)
-        self.report({'page': self.status})
-
-    def _load_files(self) -> None:
-        self.scene = Scene()
-        self._frame = PartFrame(self, self.values['frame_id'])
-        self._flow: dict[str, float] = {}
-        # The simulator, which cannot paint a pose without a transform, says why.
-        self._waiting: dict[str, TfQueue] = {
-            name: deque() for name in self.values['atomizers'] or ['']
-        }
-        # Stamp of the newest figures; their time, which goes on where a stream is restarted.
-        self._newest_ns, self._time_s = 0, 0.0
-        self._comparison = ComparisonStats(rmse_um=math.nan)
-        # What makes the film doubtful, '' if nothing does, and when the simulator said so.
-        self._doubts, self._trusted_s = '', time.monotonic()
-        self._problem = ''
-        self._sent = 0, time.monotonic()
-        self._show_part(self.values['mesh_file'])
-        values = self.values
-        token = os.environ.get(TOKEN, '')
-        self.page = Page(self.scene, values['host'], values['port'], token)
-        # Not to the log, which is published.
-        sys.stdout.write(f'the page is at {self.page.url}\n')
-        sys.stdout.flush()
+        return {'page': self.status}
 
     def close(self) -> None:
         self.page.close()

@@ -3,12 +3,11 @@
 import math
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from heapq import merge
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TransformStamped
@@ -42,7 +41,7 @@ from paint_deposition.files.recordings.pose_topics import (
 from paint_deposition.motion.trajectory import relative_flow
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
-from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
 from paint_deposition.nodes.topics import header, header_stamp_ns, pose_message, state_message
 from paint_deposition.request import MotionOptions
@@ -97,33 +96,7 @@ class BagPlayer(PaintNode):
         publish_clock=NodeParameter(True, 'Publish /clock [true/false]'),
     )
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
-        # Reliable, so that subscribers acknowledge.
-        profile = QoSProfile(depth=max(topics.POSE_DEPTH, self.values['window']))
-        self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
-        self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
-        self._clock_publisher: Publisher | None = None
-        self._clock_order = threading.Lock()
-        self._time = ReplayClock(self.values['rate'], running=not self.values['start_paused'])
-        if self.values['publish_clock']:
-            self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
-            self.create_steady_timer(0.01, self._publish_clock)
-        self.create_service(Trigger, '~/pause', lambda *_: self._set_running(False))
-        self.create_service(Trigger, '~/resume', lambda *_: self._set_running(True))
-        self._subscribers_to_await = self.values['wait_for_subscribers']
-        window = self.values['window']
-        self._flow_control = FlowControl(self, self._pose_publisher, window, self.stopped)
-        self.poses_published = self.states_published = 0
-        self.report({'replay': self.status})
-        self.start_thread(self._replay)
-
-    def close(self) -> None:
-        super().close()
-        replayed = f'replayed {self.poses_published} poses, {self.states_published} states'
-        self.get_logger().info(replayed)
-
-    def _load_files(self) -> None:
+    def _configure(self) -> Mapping[str, Task]:
         values = self.values
         if not values['bag']:
             raise PaintError('bag_player: bag is empty: give the path of a recording')
@@ -155,6 +128,30 @@ class BagPlayer(PaintNode):
                 self.get_logger().info(
                     f'no state_topic: the gun always sprays; the bag has {" ".join(unused)}'
                 )
+        # Reliable, so that subscribers acknowledge.
+        profile = QoSProfile(depth=max(topics.POSE_DEPTH, values['window']))
+        self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
+        self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
+        self._clock_publisher: Publisher | None = None
+        self._clock_order = threading.Lock()
+        self._time = ReplayClock(values['rate'], running=not values['start_paused'])
+        if values['publish_clock']:
+            self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
+            self.create_steady_timer(0.01, self._publish_clock)
+        self.create_service(Trigger, '~/pause', lambda *_: self._set_running(False))
+        self.create_service(Trigger, '~/resume', lambda *_: self._set_running(True))
+        self._subscribers_to_await = values['wait_for_subscribers']
+        self._flow_control = FlowControl(
+            self, self._pose_publisher, values['window'], self.stopped
+        )
+        self.poses_published = self.states_published = 0
+        self.start_thread(self._replay)
+        return {'replay': self.status}
+
+    def close(self) -> None:
+        super().close()
+        replayed = f'replayed {self.poses_published} poses, {self.states_published} states'
+        self.get_logger().info(replayed)
 
     def _create_transform_publishers(self, bag: Bag) -> None:
         """Without tf2_msgs none, and a warning that names the parameters to set instead."""

@@ -55,6 +55,9 @@ class RunRecorder(ManagedNode):
     runs = 0
 
     def _configure(self) -> Mapping[str, Task]:
+        self._custom_data = provenance(self.values['mesh_file'], self.values['model_file'])
+        if self.values['name']:
+            require_file_name('name', self.values['name'])
         guns, resolved = self.values['atomizers'] or [''], self.resolve_topic_name
         self._part_topic = resolved(PART_TOPIC)
         wanted = map(resolved, self.values['topics'] or default_topics(guns))
@@ -92,11 +95,6 @@ class RunRecorder(ManagedNode):
         self.create_steady_timer(0.1, lambda: self._guarded(self.run.close_old_chunk))
         self.create_steady_timer(0.2, self._report_progress)
         self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
-
-    def _load_files(self) -> None:
-        self._custom_data = provenance(self.values['mesh_file'], self.values['model_file'])
-        if self.values['name']:
-            require_file_name('name', self.values['name'])
 
     def _create_run(self, name: str, custom_data: dict[str, str], keep_name: bool) -> RunWriter:
         """A run of this name, if any; with date and time if it exists, unless it keeps its name.

@@ -66,13 +66,14 @@ class DepositionSimulator(PaintingNode):
     }
 
     def _configure(self) -> Mapping[str, Task]:
+        version = mesh_version(self.values['mesh_file'])
         super()._configure()
         # In a group of their own, so that poses do not wait for the disk.
         saving = ReentrantCallbackGroup()
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self.display = FilmDisplay(self)
-        self.parts = PartChange(self, self._mesh_version, self._saving, saving)
+        self.parts = PartChange(self, version, self._saving, saving)
         self.publish()
         return painting_tasks(self, self.display.diagnostic_values) | {'part': self.parts.status}
 
@@ -80,10 +81,6 @@ class DepositionSimulator(PaintingNode):
         self.parts.close()
         self._saving.shutdown()
         super()._cleanup()
-
-    def _load_files(self) -> None:
-        self._mesh_version = mesh_version(self.values['mesh_file'])
-        super()._load_files()
 
     def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         super()._validate(values, changed)

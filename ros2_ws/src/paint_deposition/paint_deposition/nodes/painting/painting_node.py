@@ -57,6 +57,16 @@ class PaintingNode(ManagedNode, ABC):
     _shown: CommonFilm | None = None
 
     def _configure(self) -> Mapping[str, Task]:
+        self.gun_names: list[str] = self.values['atomizers'] or ['']
+        self.mesh_file: str = self.values['mesh_file']
+        self.model_problem = ''
+        self._noted: set[str] = set()
+        self.frame = PartFrame(self, self.values['frame_id'])
+        self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
+        self.models = models_from_parameters(self.values)
+        self._files = self.files_in_use = self._named_files()
+        self.get_logger().info('getting ready; a new model is compiled first')
+        self._take_part(self.prepare(self.mesh_file))
         self.inputs = [AtomizerInput(self, number) for number in range(len(self.gun_names))]
         if self.autostarting:  # messages received before the node is active are painted
             self.hold()
@@ -78,18 +88,6 @@ class PaintingNode(ManagedNode, ABC):
         if self.repainting is not None:
             self.repainting.cancel()
             self.repainting = None
-
-    def _load_files(self) -> None:
-        self.gun_names: list[str] = self.values['atomizers'] or ['']
-        self.mesh_file: str = self.values['mesh_file']
-        self.model_problem = ''
-        self._noted: set[str] = set()
-        self.frame = PartFrame(self, self.values['frame_id'])
-        self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
-        self.models = models_from_parameters(self.values)
-        self._files = self.files_in_use = self._named_files()
-        self.get_logger().info('getting ready; a new model is compiled first')
-        self._take_part(self.prepare(self.mesh_file))
 
     def _named_files(self) -> list[str]:
         """The file of each gun's model, by the parameters."""
