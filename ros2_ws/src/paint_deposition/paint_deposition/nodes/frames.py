@@ -46,7 +46,7 @@ def subscribe_to_tf(
     from tf2_msgs.msg import TFMessage
 
     def take_static(message: Any, _info: Any) -> None:
-        for child, parent, _, pose in transforms_of(message):
+        for child, parent, _, pose in transforms_of(message.transforms):
             tree.fix(child, parent, pose)
 
     subscribe = partial(AdaptiveSubscription, node, TFMessage, depth=QUEUE_DEPTH, polled=polled)
@@ -75,7 +75,7 @@ class PartFrame:
             self.tf_topics = subscribe_to_tf(node, self.tree, self._take)
 
     def _take(self, message: Any, _info: Any) -> None:
-        for transform in transforms_of(message):
+        for transform in transforms_of(message.transforms):
             self.tree.add(*transform)
 
     def set_part_pose(self, parent_frame: str, part_pose: Sequence[float]) -> None:
@@ -228,7 +228,7 @@ class TfPoses:
 
     def _take(self, message: Any, info: Mapping[str, Any]) -> None:
         """Take moving transforms, and look up the poses that all transforms are now known for."""
-        for child, parent, stamp, pose in transforms_of(message):
+        for child, parent, stamp, pose in transforms_of(message.transforms):
             stamps = [stamp]
             if self._tree.add(child, parent, stamp, pose):
                 # The first of the restarted stream could have been a late one.

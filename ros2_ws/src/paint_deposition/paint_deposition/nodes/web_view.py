@@ -9,7 +9,6 @@ from collections import deque
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -203,7 +202,7 @@ class WebView(PaintNode):
                     self.scene.move_gun(gun, position, z_axis, self._flow.get(gun, 1.0))
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
-        for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
+        for _, parent, _, pose in transforms_of([placed]):
             self._frame.tree.place(self._frame.frame_id, parent, pose)
 
     def _take_input(self, gun: str, message: PoseStamped | AtomizerState, _info: Any) -> None:

@@ -4,7 +4,6 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -64,8 +63,8 @@ def _edges(bag: Bag, static: bool) -> Edges:
     rows: dict[tuple[str, str], list[tuple]] = defaultdict(list)
     parts: dict[tuple[str, str], list[tuple]] = defaultdict(list)
     for names, found in ((topics, rows), (placed, parts)):
-        for _, log_time_ns, message in bag.decoded(names) if names else ():
-            several = message if found is rows else SimpleNamespace(transforms=[message])
+        for _, log_time_ns, message in bag.decoded(names):
+            several = message.transforms if found is rows else [message]
             for child, parent, stamp, pose in transforms_of(several):
                 found[child, parent].append((stamp, log_time_ns, pose))
     for (child, parent), poses in parts.items():

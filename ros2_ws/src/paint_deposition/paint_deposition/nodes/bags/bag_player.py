@@ -249,7 +249,7 @@ class BagPlayer(PaintNode):
                 for stamp, at_ns, place in zip(stamps_ns, logged_ns, places, strict=True)
             )
         log_time = attrgetter('log_time_ns')
-        messages = merge(bag.messages(read) if read else (), poses, key=log_time)
+        messages = merge(bag.messages(read), poses, key=log_time)
         for _, simultaneous in groupby(messages, key=log_time):
             yield from sorted(simultaneous, key=lambda each: each.topic == self._pose_topic)
 
