@@ -240,37 +240,36 @@ class EgmSource(PaintNode):
             f'{heard.received} packets, {heard.lost} lost, {heard.repeated} repeated'
         )
 
-    def destroy_node(self) -> None:
-        super().destroy_node()
-        self._socket.close()
-
     def _listen(self) -> None:
         frame_id, names = self.values['frame_id'], self.values['joint_names']
         external = self.values['external_joints']
-        while not self.stopped.is_set():
-            try:
-                packet, (sender, _) = self._socket.recvfrom(65_536)
-            except TimeoutError:
-                continue
-            arrived_ns = time.time_ns()
-            if self.values['robot_address'] not in ('', sender):
-                self.stream.invalid += 1
-            elif position := self.stream.take(packet, arrived_ns, sender):
-                self._heard_s = time.monotonic()
-                stamp, pose, joints, axes = position
-                self._lacks = ''
-                if len(axes) < len(external):
-                    self._lacks = f'{len(axes)} external axes, and external_joints has more'
-                if pose is None:
-                    self._lacks = 'no pose: give EGM a tool and a frame'
-                else:
-                    self._poses.publish(pose_message(frame_id, stamp, pose))
-                if len(joints) >= len(names) and len(axes) >= len(external):
-                    scaled = axes[: len(external)] * self.values['external_scales']
-                    positions = [*joints[: len(names)].tolist(), *scaled.tolist()]
-                    at = header(frame_id, stamp)
-                    message = JointState(header=at, name=[*names, *external], position=positions)
-                    self._joints.publish(message)
+        with self._socket:
+            while not self.stopped.is_set():
+                try:
+                    packet, (sender, _) = self._socket.recvfrom(65_536)
+                except TimeoutError:
+                    continue
+                arrived_ns = time.time_ns()
+                if self.values['robot_address'] not in ('', sender):
+                    self.stream.invalid += 1
+                elif position := self.stream.take(packet, arrived_ns, sender):
+                    self._heard_s = time.monotonic()
+                    stamp, pose, joints, axes = position
+                    self._lacks = ''
+                    if len(axes) < len(external):
+                        self._lacks = f'{len(axes)} external axes, and external_joints has more'
+                    if pose is None:
+                        self._lacks = 'no pose: give EGM a tool and a frame'
+                    else:
+                        self._poses.publish(pose_message(frame_id, stamp, pose))
+                    if len(joints) >= len(names) and len(axes) >= len(external):
+                        scaled = axes[: len(external)] * self.values['external_scales']
+                        positions = [*joints[: len(names)].tolist(), *scaled.tolist()]
+                        at = header(frame_id, stamp)
+                        message = JointState(
+                            header=at, name=[*names, *external], position=positions
+                        )
+                        self._joints.publish(message)
 
     def status(self) -> Status:
         stream, values = self.stream, self.values

@@ -1,4 +1,4 @@
-"""Poses by way of frames: into that of the part, and of a robot's tip from its joints or tf."""
+"""Poses by way of frames: into that of the part, and of the tip of a robot."""
 
 import contextlib
 import time
@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from rclpy.publisher import Publisher
-from sensor_msgs.msg import JointState
 
-from paint_deposition.errors import PaintError, RecordingError, did_you_mean
-from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.errors import PaintError, did_you_mean
 from paint_deposition.files.recordings.messages import pose_of, stamp_ns, transforms_of
 from paint_deposition.motion.transforms import (
     LONGEST_GAP_NS,
@@ -147,48 +145,6 @@ def placed_in_order(
             placed = missing
         waiting.popleft()
         yield pose, placed
-
-
-class JointPoses:
-    """Computes the pose of link `tip` in `base` from each joint state, which needs all joints.
-
-    `topic` is that of the joint states, for messages; `take_pose` is called with each pose.
-    """
-
-    def __init__(self, robot: Robot, topic: str, take_pose: TakePose) -> None:
-        self.base, self.tip = robot.base, robot.tip
-        self._robot, self._topic, self._take_pose = robot, topic, take_pose
-        self._poses = self._incomplete = 0
-        self._refusal = ''
-        self._received_s = time.monotonic()
-
-    def take(self, _topic: str, message: JointState, info: Mapping[str, Any]) -> None:
-        """Compute the pose for a joint state; the callback of its subscription."""
-        positions_by_name = dict(zip(message.name, message.position, strict=False))
-        try:
-            found = self._robot.recorded_joints(positions_by_name, self._topic)
-            values = np.array([[found[name] for name in self._robot.moving_joints]])
-            if not np.isfinite(values).all():
-                raise RecordingError(f'{self._topic} has joints that are not finite')
-            positions, quaternions = self._robot.poses(self._robot.in_si(values, self._topic))
-        except RecordingError as error:
-            self._incomplete, self._refusal = self._incomplete + 1, str(error)
-            return
-        self._received_s, self._refusal = time.monotonic(), ''
-        tip = Rigid.of([*positions[0], *quaternions[0]])
-        self._poses += 1
-        self._take_pose(stamp_ns(message.header), tip, info['source_timestamp'])
-
-    def status(self) -> Status:
-        """Whether joint states arrive, and have all joints."""
-        values = {'robot': self._robot.path, 'joint states refused': self._incomplete}
-        if self._incomplete and not self._poses:
-            return ERROR, f'no joint state has all joints: {self._refusal}', values
-        if time.monotonic() - self._received_s > SILENT_S:
-            if self._refusal:
-                return ERROR, f'joint states are refused: {self._refusal}', values
-            return WARN, f'no joint states on {self._topic}', values
-        return OK, 'following the robot', values
 
 
 class TfPoses:
