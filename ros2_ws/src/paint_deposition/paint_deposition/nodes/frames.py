@@ -32,6 +32,7 @@ TF_TIMEOUT_S = 1e-9 * LONGEST_GAP_NS
 Place = tuple[np.ndarray, np.ndarray]
 # (stamp [ns], pose of the tip, when it was sent [ns] or 0)
 TakePose = Callable[[int, Rigid, int], None]
+# Without poses or transforms for so long, that is reported.
 SILENT_S = 2.0
 # Deep queues that are emptied before poses are judged: a busy node has its transforms.
 QUEUE_DEPTH = 5000

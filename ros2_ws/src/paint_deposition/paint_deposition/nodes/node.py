@@ -90,20 +90,12 @@ class PaintNode(Node):
     def _load(self) -> Mapping[str, Task]:
         """Configure the node; SIGINT and SIGTERM interrupt it."""
         PaintNode.loading = True
-        PaintNode.end_if_loading()
         try:
+            if PaintNode.stopping:
+                os._exit(0)
             return self._configure()
         finally:
             PaintNode.loading = False
-
-    @classmethod
-    def end_if_loading(cls) -> None:
-        """End a process that is to stop and reads files, which takes minutes with a new model.
-
-        Nothing is lost. An exception instead could be swallowed by a library or by the compiler.
-        """
-        if PaintNode.stopping and PaintNode.loading:
-            os._exit(0)
 
     # --- for the subclass
 
@@ -289,7 +281,10 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
     def on_signal(number: int, _frame: object) -> None:
         received.append(number)
         PaintNode.stopping = True
-        PaintNode.end_if_loading()
+        # Files are read for minutes with a new model, and nothing is lost. An exception instead
+        # could be swallowed by a library or by the compiler.
+        if PaintNode.loading:
+            os._exit(0)
 
     try:
         for number in (signal.SIGINT, signal.SIGTERM):

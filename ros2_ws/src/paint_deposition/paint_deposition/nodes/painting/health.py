@@ -9,6 +9,7 @@ import numpy as np
 
 from paint_deposition.files.recordings.messages import STATE_TYPE
 from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.nodes.frames import SILENT_S
 from paint_deposition.nodes.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.painting.atomizer_input import (
     STATES_REFUSED,
@@ -17,8 +18,6 @@ from paint_deposition.nodes.painting.atomizer_input import (
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.topics import gun_topic
 
-# Without poses for so long, a gun that sprays is reported.
-SILENT_S = 2.0
 NO_BRUSH = 'no state names one of the brushes yet: nothing is painted'
 # What a count of poses and states is called, and whether the film lacks something because of it.
 COUNTS = {
