@@ -111,8 +111,6 @@ class RunWriter(AbstractContextManager):
 
         ``offered`` are the profiles of its publishers.
         """
-        if name in self._about:
-            raise RecordingError(f'{name} is already recorded in {self.folder}')
         qos, type_hash = dump_qos_v9(list(offered)), definition.type_hash
         with self._write_errors():
             if message_type not in self._schemas:
@@ -150,10 +148,8 @@ class RunWriter(AbstractContextManager):
                 self._writer.flush()
             self._chunk_opened_s = None
 
-    def finish(self) -> Path:
-        """Complete the run and return its folder."""
-        if self.complete:
-            return self.folder
+    def finish(self) -> None:
+        """Complete the run."""
         with self._write_errors():
             self._writer.flush()
             self._writer.add_metadata('rosbag2', {'serialized_metadata': _yaml(self._metadata())})
@@ -164,7 +160,6 @@ class RunWriter(AbstractContextManager):
             information = {'rosbag2_bagfile_information': self._metadata()}
             write_text(self.folder / 'metadata.yaml', _yaml(information))
         self.complete = True
-        return self.folder
 
     def abandon(self) -> None:
         """Close the file as it is; the run stays unfinished."""

@@ -56,8 +56,6 @@ class RunRecorder(ManagedNode):
 
     def _configure(self) -> Mapping[str, Task]:
         self._custom_data = provenance(self.values['mesh_file'], self.values['model_file'])
-        if self.values['name']:
-            require_file_name('name', self.values['name'])
         guns, resolved = self.values['atomizers'] or [''], self.resolve_topic_name
         self._part_topic = resolved(PART_TOPIC)
         wanted = map(resolved, self.values['topics'] or default_topics(guns))
@@ -114,7 +112,7 @@ class RunRecorder(ManagedNode):
 
     def destroy_node(self) -> None:
         for run in (self.run, self.leaving) if self.runs else ():
-            if run is not None and not run.complete:
+            if run is not None:
                 run.abandon()
         super().destroy_node()
 
