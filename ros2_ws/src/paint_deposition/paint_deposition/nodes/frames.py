@@ -30,6 +30,8 @@ from paint_deposition.nodes.topics import AdaptiveSubscription, header
 TF_TIMEOUT_S = 1e-9 * LONGEST_GAP_NS
 # Position (3,) [m] and quaternion (4,).
 Place = tuple[np.ndarray, np.ndarray]
+# Poses that wait, in order, for their transform, and since when [monotonic s].
+TfQueue = deque[tuple[float, PoseStamped]]
 # (stamp [ns], pose of the tip, when it was sent [ns] or 0)
 TakePose = Callable[[int, Rigid, int], None]
 # Without poses or transforms for so long, that is reported.
@@ -118,34 +120,30 @@ class PartFrame:
             raise NoTransform(f'{missing}; {remedy}', may_come) from None
         return into_part.applied(*pose)
 
+    def placed_in_order(
+        self, waiting: TfQueue
+    ) -> Iterator[tuple[PoseStamped, Place | NoTransform]]:
+        """Take poses from a queue, the oldest first, until one has to wait for its transform.
 
-# Poses that wait, in order, for their transform, and since when [monotonic s].
-TfQueue = deque[tuple[float, PoseStamped]]
+        As in tf2's MessageFilter, it delays all behind it. It is given up if the transform cannot
+        come any more, after `TF_TIMEOUT_S`, or if more than 5000 poses wait.
 
-
-def placed_in_order(
-    waiting: TfQueue, place: Callable[[PoseStamped], Place], now_s: float
-) -> Iterator[tuple[PoseStamped, Place | NoTransform]]:
-    """Take poses from a queue, the oldest first, until one has to wait for its transform.
-
-    As in tf2's MessageFilter, it delays all behind it. It is given up if the transform cannot come
-    any more, after `TF_TIMEOUT_S`, or if more than 5000 poses wait.
-
-    Yields:
-        Each pose, and its place or why it has none.
-    """
-    while waiting:
-        since_s, pose = waiting[0]
-        placed: Place | NoTransform
-        try:
-            placed = place(pose)
-        except NoTransform as missing:
-            in_time = now_s - since_s < TF_TIMEOUT_S and len(waiting) <= 5000
-            if missing.may_come and in_time:
-                return
-            placed = missing
-        waiting.popleft()
-        yield pose, placed
+        Yields:
+            Each pose, and its place or why it has none.
+        """
+        now_s = time.monotonic()
+        while waiting:
+            since_s, pose = waiting[0]
+            placed: Place | NoTransform
+            try:
+                placed = self.on_part(pose)
+            except NoTransform as missing:
+                in_time = now_s - since_s < TF_TIMEOUT_S and len(waiting) <= 5000
+                if missing.may_come and in_time:
+                    return
+                placed = missing
+            waiting.popleft()
+            yield pose, placed
 
 
 class TfPoses:

@@ -21,7 +21,7 @@ from paint_deposition.files.recordings.messages import stamp_ns, transforms_of, 
 from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.transforms import PART_POSE_TOPIC, NoTransform
 from paint_deposition.nodes import topics
-from paint_deposition.nodes.frames import PartFrame, TfQueue, placed_in_order
+from paint_deposition.nodes.frames import PartFrame, TfQueue
 from paint_deposition.nodes.node import OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.parameters import (
@@ -191,7 +191,7 @@ class WebView(PaintNode):
         for topic in (*self._frame.tf_topics, *self._inputs):
             topic.take_pending()
         for gun, waiting in self._waiting.items():
-            for pose, placed in placed_in_order(waiting, self._frame.on_part, time.monotonic()):
+            for pose, placed in self._frame.placed_in_order(waiting):
                 if isinstance(placed, NoTransform):
                     continue
                 position_m, quaternion = placed

@@ -21,7 +21,7 @@ from paint_deposition.motion.stream_quality import SpeedNow, StreamSteps
 from paint_deposition.motion.trajectory import SPRAYS_NOTHING
 from paint_deposition.motion.transforms import NoTransform
 from paint_deposition.nodes import topics
-from paint_deposition.nodes.frames import TfQueue, placed_in_order
+from paint_deposition.nodes.frames import TfQueue
 from paint_deposition.nodes.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
 
 if TYPE_CHECKING:
@@ -236,7 +236,7 @@ class AtomizerInput:
     def _place(self) -> None:
         """Put the poses whose transforms are known into the next batch."""
         frame = self._node.frame
-        for pose, placed in placed_in_order(self.tf_queue, frame.on_part, time.monotonic()):
+        for pose, placed in frame.placed_in_order(self.tf_queue):
             frame_id = pose.header.frame_id
             if not isinstance(placed, NoTransform):
                 self.anomalies['poses without a frame'] += not frame_id
