@@ -20,7 +20,7 @@ MANAGED = fixed(
 ENTITIES = ('publisher', 'subscription', 'service', 'client', 'timer')
 
 
-class ManagedNode(LifecycleNodeMixin, PaintNode):
+class ManagedNode(PaintNode, LifecycleNodeMixin):
     """A node with the lifecycle of a managed node of ROS 2.
 
     `configure` reads its files and creates its topics and services; `activate` starts its work.
@@ -36,14 +36,10 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     autostarting = False
     _failure: Exception | None = None
 
-    def __init__(self, **kwargs: Any):
+    def _start(self) -> None:
         # The entities that `configure` created, and those that `activate` created.
         self._created: list[set[Any]] = []
-        # The mixin does not pass arguments on; it is initialised once the node exists.
-        PaintNode.__init__(self, **kwargs)
-
-    def _start(self) -> None:
-        LifecycleNodeMixin.__init__(self)
+        LifecycleNodeMixin.__init__(self)  # now that the node exists
         self.report({'state': self._state_status})
         self.autostarting = self.values['autostart']
         if not self.autostarting:
