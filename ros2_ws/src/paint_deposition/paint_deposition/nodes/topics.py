@@ -46,6 +46,7 @@ STAMP_OFFSET = 4
 # (stamp [ns], palette (P, 4) uint8 RGBA, (V,) row of the palette for each vertex) -> a serialised
 # Marker, ready to be published.
 MeshMessage = Callable[[int, np.ndarray, np.ndarray], bytes]
+# In order the strictest, which is reliable and latched, comes first.
 Quality = tuple[ReliabilityPolicy, DurabilityPolicy]
 USUAL = ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE
 
@@ -110,7 +111,7 @@ class AdaptiveSubscription:
         """Take all messages in the queues."""
         if self._polled and time.monotonic() - self._matched_s > 0.1:
             self.match_qos()
-        for quality in sorted(self._subscriptions, key=_strictest_first):
+        for quality in sorted(self._subscriptions):
             self._drain(quality)
 
     def match_qos(self) -> None:
@@ -126,7 +127,7 @@ class AdaptiveSubscription:
             for info in publishers
         }
         wanted = {*self._offered.values()} or {*self._subscriptions} or {USUAL}
-        for quality in sorted(wanted - self._subscriptions.keys(), key=_strictest_first):
+        for quality in sorted(wanted - self._subscriptions.keys()):
             self._made_s[quality] = self._matched_s
             reliability, durability = quality
             subscription = self._subscriptions[quality] = self._node.create_subscription(
@@ -187,10 +188,6 @@ class AdaptiveSubscription:
             if len(self._taken) > 2000:
                 del self._taken[next(iter(self._taken))]
         self._take(message, info)
-
-
-def _strictest_first(quality: Quality) -> tuple[bool, bool]:
-    return quality[0] != ReliabilityPolicy.RELIABLE, quality[1] == DurabilityPolicy.VOLATILE
 
 
 def header(frame_id: str, stamp_ns: int) -> Header:
