@@ -240,7 +240,7 @@ def test_what_is_sent_before_its_publisher_is_heard_is_counted(record, cell, wai
     assert recorder.recorded['/new/atomizer/pose'].losses == (
         f'0 missed, {before_discovery} sent before the recorder heard their publisher'
     )
-    of_old = recorder.recorded['/old/atomizer/pose'].before_discovery
+    of_old = recorder.recorded['/old/atomizer/pose'].before_discovery.total()
     assert 0 < of_old < sent_before, 'by its rate, those since the recording began'
     assert f'{before_discovery} of /new/atomizer/pose sent before the' in recorder.summary()
 

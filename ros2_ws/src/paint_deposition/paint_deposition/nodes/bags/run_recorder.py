@@ -300,7 +300,7 @@ class RunRecorder(ManagedNode):
         topics = self.recorded.values()
         missed = sum(topic.lost for topic in topics)
         lost = f', {missed} missed' if missed else ''
-        first = [f'{t.before_discovery} of {t.name}' for t in topics if t.before_discovery]
+        first = [f'{count} of {t.name}' for t in topics if (count := t.before_discovery.total())]
         lost += f', {" and ".join(first)} {MISSED_BEFORE_DISCOVERY}' if first else ''
         if any(topic.unnumbered for topic in topics):
             lost += ' (losses cannot be counted: this middleware does not number messages)'

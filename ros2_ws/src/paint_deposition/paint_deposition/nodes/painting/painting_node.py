@@ -63,8 +63,8 @@ class PaintingNode(ManagedNode, ABC):
         self._noted: set[str] = set()
         self.frame = PartFrame(self, self.values['frame_id'])
         self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
-        self.models = models_from_parameters(self.values)
-        self._files = self.files_in_use = self._named_files()
+        self.models, self._files = models_from_parameters(self.values)
+        self.files_in_use = self._files
         self.get_logger().info('getting ready; a new model is compiled first')
         self._take_part(self.prepare(self.mesh_file))
         self.inputs = [AtomizerInput(self, number) for number in range(len(self.gun_names))]
@@ -88,10 +88,6 @@ class PaintingNode(ManagedNode, ABC):
         if self.repainting is not None:
             self.repainting.cancel()
             self.repainting = None
-
-    def _named_files(self) -> list[str]:
-        """The file of each gun's model, by the parameters."""
-        return self.values['model_files'] or [self.values['model_file']] * len(self.gun_names)
 
     # --- for the subclass
 
@@ -213,7 +209,7 @@ class PaintingNode(ManagedNode, ABC):
             for gun in self.film.guns:
                 gun.trigger_latency_s = self.values['trigger_latency_s']
         if names & MODEL_PARAMETERS:
-            self.models, self._files = self._next_models, self._named_files()
+            self.models, self._files = self._next_models
             self._repaint(from_start=self.values['repaint'])
         if 'publish_rate_hz' in names:
             self.show_timer.timer_period_ns = round(1e9 / self.values['publish_rate_hz'])
