@@ -132,10 +132,24 @@ class DepositionSimulator(PaintingNode):
             part: description of the part for the statistics file.
         """
         film, surface, zones = self.film.snapshot(), self.surface, self.zones
-        values, names, details = dict(self.values), self.gun_names, self._details()
-        counts, files = [gun.counts.to_dict() for gun in self.film.guns], self.files_in_use
-        if part:
-            details['part'] = part
+        values, names, files = dict(self.values), self.gun_names, self.files_in_use
+        counts = [gun.counts.to_dict() for gun in self.film.guns]
+        effects = (effect.id for gun in self.film.guns for effect in gun.model.effects)
+        refused: dict[str, int] = {}
+        for source in self.inputs:
+            refused |= source.refused_frames
+        details: dict[str, Any] = {
+            'mesh_file': self.mesh_file,
+            'mesh_id': surface.mesh_id,
+            'frame_id': self.frame.frame_id,
+            'down': surface.down,
+            'model_file': files[0] if len({*files}) == 1 else '',
+            'zones_file': values['zones_file'],
+            'effects': list(dict.fromkeys(effects)),
+            'poses': self.film.counts.to_dict(),
+            'poses_in_other_frames': refused,
+            **({'part': part} if part else {}),
+        }
 
         def write() -> list[Path]:
             details['atomizers'] = [
@@ -158,21 +172,3 @@ class DepositionSimulator(PaintingNode):
             )  # fmt: skip
 
         return write
-
-    def _details(self) -> dict[str, Any]:
-        """What the statistics file says beside the figures of the film."""
-        refused = [source.refused_frames.items() for source in self.inputs]
-        effects = (effect.id for gun in self.film.guns for effect in gun.model.effects)
-        return {
-            'mesh_file': self.mesh_file,
-            'mesh_id': self.surface.mesh_id,
-            'frame_id': self.frame.frame_id,
-            'down': self.surface.down,
-            'model_file': self.files_in_use[0] if len({*self.files_in_use}) == 1 else '',
-            'zones_file': self.values['zones_file'],
-            'effects': list(dict.fromkeys(effects)),
-            'poses': self.film.counts.to_dict(),
-            'poses_in_other_frames': {
-                frame: count for frames in refused for frame, count in frames
-            },
-        }
