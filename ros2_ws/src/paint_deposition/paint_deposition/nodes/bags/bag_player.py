@@ -265,23 +265,20 @@ class BagPlayer(PaintNode):
         elif message.topic in self._transform_topics:
             self._transform_publishers[message.topic.endswith(STATIC)].publish(message.cdr)
         else:
-            self._state_publisher.publish(self._state_of(message, bag))
+            if message.type == BOOL_TYPE:
+                spraying = deserialize_message(message.cdr, Bool).data
+                at, flow = header('', message.log_time_ns), relative_flow(spraying)
+                state = state_message(header=at, spraying=spraying, flow=flow)
+            else:  # of any version: fields of the same name are copied
+                recorded = bag.decode(message)
+                at = header(recorded.header.frame_id, stamp_ns(recorded.header))
+                state = state_message(header=at)
+                for name in state.get_fields_and_field_types():
+                    if name != 'header' and hasattr(recorded, name):
+                        kind = type(getattr(state, name))
+                        setattr(state, name, kind(getattr(recorded, name)))
+            self._state_publisher.publish(state)
             self.states_published += 1
-
-    def _state_of(self, message: RawMessage, bag: Bag) -> AtomizerState:
-        """A recorded Bool, or state of any version of the message, as a message of today."""
-        if message.type == BOOL_TYPE:
-            spraying = deserialize_message(message.cdr, Bool).data
-            at = header('', message.log_time_ns)
-            return state_message(header=at, spraying=spraying, flow=relative_flow(spraying))
-        recorded = bag.decode(message)
-        at = header(recorded.header.frame_id, stamp_ns(recorded.header))
-        state = state_message(header=at)
-        for name in state.get_fields_and_field_types():
-            if name != 'header' and hasattr(recorded, name):
-                kind = type(getattr(state, name))
-                setattr(state, name, kind(getattr(recorded, name)))
-        return state
 
     def _publish_clock(self) -> None:
         with self._clock_order:
