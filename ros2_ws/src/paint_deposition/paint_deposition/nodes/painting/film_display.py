@@ -5,6 +5,7 @@ import time
 from array import array
 from collections.abc import Callable, Mapping
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -105,11 +106,12 @@ class LargeTopic:
     """
 
     def __init__(self, node: Node, message: type, topic: str, profile: QoSProfile) -> None:
-        self._subscribers = self._new_subscribers = 0
+        # The event of the last subscriber that came or left.
+        self._matched: Any = SimpleNamespace(current_count=0, total_count=0)
+        matched = PublisherEventCallbacks(matched=partial(setattr, self, '_matched'))
         self._publisher: Publisher = node.create_publisher(
-            message, topic, profile,
-            event_callbacks=PublisherEventCallbacks(matched=self._count_subscribers),
-        )  # fmt: skip
+            message, topic, profile, event_callbacks=matched
+        )
         # The last version sent, and the total number of subscribers by then.
         self._sent: tuple[int, int] | None = None
         self._sent_s = self._next_allowed_s = 0.0
@@ -117,9 +119,9 @@ class LargeTopic:
     def publish_if_wanted(self, version: int, make: Callable[[], Any]) -> None:
         """Publish a version if a subscriber lacks it and the link is free; else call it again."""
         # Not the publisher's own count, which grows before the event of a new subscriber.
-        wanted = version, self._new_subscribers
-        began_s = time.monotonic()
-        if not self._subscribers or wanted == self._sent or began_s < self._next_allowed_s:
+        matched, began_s = self._matched, time.monotonic()
+        wanted = version, matched.total_count
+        if not matched.current_count or wanted == self._sent or began_s < self._next_allowed_s:
             return
         acknowledged = self._publisher.wait_for_all_acked(Duration(nanoseconds=0))
         if not acknowledged and began_s < self._sent_s + ACKNOWLEDGE_TIMEOUT_S:
@@ -127,10 +129,6 @@ class LargeTopic:
         self._publisher.publish(make())
         self._sent, self._sent_s = wanted, time.monotonic()
         self._next_allowed_s = began_s + 5.0 * (self._sent_s - began_s)
-
-    def _count_subscribers(self, event: Any) -> None:
-        self._subscribers = event.current_count
-        self._new_subscribers += event.total_count_change
 
 
 class FilmDisplay:
