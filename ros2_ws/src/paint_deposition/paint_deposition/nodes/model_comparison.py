@@ -21,7 +21,6 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.node import OK, WARN, Status, Task
 from paint_deposition.nodes.painting.film_display import legend
-from paint_deposition.nodes.painting.health import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.parameters import CONFIGURED, NodeParameter, fixed
@@ -65,7 +64,7 @@ class ModelComparison(PaintingNode):
         self.readings = read_readings(self.values['measurements_file'])
         self.get_logger().info(self.readings.understood)
         self._noise = gauge_noise(self.readings)
-        super()._configure()
+        tasks = super()._configure()
         latched = partial(self.create_publisher, qos_profile=topics.LATCHED)
         self._mesh_publisher = latched(Marker, 'comparison/mesh')
         self._stats_publisher = latched(ComparisonStats, 'comparison/stats')
@@ -73,7 +72,7 @@ class ModelComparison(PaintingNode):
         self.create_service(Trigger, '~/compare', lambda *_: self._compare())
         self._legend_publisher.publish(legend(self._scale, self.surface, self.frame.frame_id))
         self.publish()
-        return painting_tasks(self) | {'comparison': self.status}
+        return {**tasks, 'comparison': self.status}
 
     # --- the part and its readings
 

@@ -16,7 +16,6 @@ from paint_deposition.nodes.painting.film_display import (
     laid_by_gun,
     statistics_of,
 )
-from paint_deposition.nodes.painting.health import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
@@ -67,7 +66,7 @@ class DepositionSimulator(PaintingNode):
 
     def _configure(self) -> Mapping[str, Task]:
         version = mesh_version(self.values['mesh_file'])
-        super()._configure()
+        tasks = super()._configure()
         # In a group of their own, so that poses do not wait for the disk.
         saving = ReentrantCallbackGroup()
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
@@ -75,7 +74,7 @@ class DepositionSimulator(PaintingNode):
         self.display = FilmDisplay(self)
         self.parts = PartChange(self, version, self._saving, saving)
         self.publish()
-        return painting_tasks(self, self.display.diagnostic_values) | {'part': self.parts.status}
+        return {**tasks, 'film': self.display.film_status, 'part': self.parts.status}
 
     def _cleanup(self) -> None:
         self.parts.close()

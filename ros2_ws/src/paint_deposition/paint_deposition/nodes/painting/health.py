@@ -1,9 +1,10 @@
 """The diagnostics of the nodes that paint, and what puts their film in doubt."""
 
+from __future__ import annotations
+
 import math
 import time
-from collections.abc import Callable, Mapping
-from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +16,10 @@ from paint_deposition.nodes.painting.atomizer_input import (
     STATES_REFUSED,
     AtomizerInput,
 )
-from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.topics import gun_topic
+
+if TYPE_CHECKING:
+    from paint_deposition.nodes.painting.painting_node import PaintingNode
 
 NO_BRUSH = 'no state names one of the brushes yet: nothing is painted'
 # What a count of poses and states is called, and whether the film lacks something because of it.
@@ -35,17 +38,6 @@ UNPAINTED = 'poses not painted while inactive'
 DOUBTFUL = {name for name, lacks in COUNTS.values() if lacks} | {
     LOST, REFUSED, UNPAINTED, STATES_REFUSED,
 }  # fmt: skip
-
-
-def painting_tasks(
-    node: PaintingNode, film_values: Callable[[], Mapping[str, object]] = dict
-) -> dict[str, Callable[[], Status]]:
-    """The diagnostic tasks by name; `film_values` returns further values for the film's."""
-    poses = {
-        gun_topic(source.name, 'poses'): partial(poses_status, node, number)
-        for number, source in enumerate(node.inputs)
-    }
-    return {**poses, 'film': lambda: film_status(node, film_values())}
 
 
 def what_was_wrong(source: AtomizerInput, film: LiveFilm) -> dict[str, int]:
@@ -129,7 +121,7 @@ def _state_of_another_type(node: PaintingNode, gun: str) -> str:
     return ''
 
 
-def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
+def film_status(node: PaintingNode) -> Status:
     """The status of part, model and computing time."""
     guns = node.film.guns
     # Computing time over duration of the motion; above 1 the node falls behind.
@@ -146,7 +138,6 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
         'poses remembered': sum(gun.log.poses for gun in guns),
         'real-time factor': f'{factor:.2f}',
         **{f'note {number}': note for number, note in enumerate(node.surface.notes, start=1)},
-        **more_values,
     }
     if node.model_problem:
         return WARN, node.model_problem, values

@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,11 +22,13 @@ from paint_deposition.nodes.frames import PartFrame
 from paint_deposition.nodes.managed_node import ManagedNode
 from paint_deposition.nodes.node import Task
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
+from paint_deposition.nodes.painting.health import film_status, poses_status
 from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
     models_from_parameters,
     read_part,
 )
+from paint_deposition.nodes.topics import gun_topic
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, facing, toward_the_guns
 
@@ -75,7 +78,11 @@ class PaintingNode(ManagedNode, ABC):
         self.create_steady_timer(0.1, self._update)
         period_s = 1.0 / self.values['publish_rate_hz']
         self.show_timer = self.create_steady_timer(period_s, self.publish)
-        return {}
+        poses = {
+            gun_topic(source.name, 'poses'): partial(poses_status, self, number)
+            for number, source in enumerate(self.inputs)
+        }
+        return {**poses, 'film': partial(film_status, self)}
 
     def _activate(self) -> None:
         self.release()
