@@ -8,6 +8,7 @@ import pytest
 import yaml
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from rosbags.interfaces import QosReliability
 from rosbags.rosbag2 import Reader
 
 from files.recorded import straight_pass
@@ -47,7 +48,8 @@ def test_whole_recordings_of_others_come_back_whole(tmp_path, shared_data, name)
 def cut_run(tmp_path):
     """A run cut in the middle of its third chunk or later; its custom data and QoS are special."""
     with RunWriter(tmp_path / 'run', {'mesh': 'door.stl'}, ros_distro='jazzy') as writer:
-        qos = [offered_qos(1, latched=True), offered_qos(7, reliable=False)]
+        weak = offered_qos(7)._replace(reliability=QosReliability.BEST_EFFORT)
+        qos = [offered_qos(1, latched=True), weak]
         writer.add_topic('/gun', BOOL, standard(BOOL), qos)
         rng = np.random.default_rng(3)
         for number in range(9_000):

@@ -3,7 +3,7 @@
 import math
 import shutil
 import struct
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from io import BytesIO
@@ -56,7 +56,6 @@ def recover(
     path: Path | str,
     folder: Path | str,
     on_bytes: Callable[[int], None] = lambda count: None,
-    topics: Collection[str] = (),
 ) -> Recovery:
     """Copy every readable message of an .mcap file or a run's folder into the new run `folder`.
 
@@ -64,7 +63,6 @@ def recover(
 
     Args:
         on_bytes: called with the number of bytes read, for a progress bar.
-        topics: to copy; all, if none are named.
 
     Raises:
         RecordingError: `path` holds no MCAP file, `folder` exists or cannot be written, or no
@@ -81,7 +79,7 @@ def recover(
     try:
         with recovery:
             for file in files:
-                _copy(file, recovery, on_bytes, topics)
+                _copy(file, recovery, on_bytes)
             if not recovery.message_count:
                 reason = '; '.join(recovery.breaks) or 'no messages'
                 raise RecordingError(f'nothing to recover in {path}: {reason}')
@@ -91,9 +89,7 @@ def recover(
     return recovery
 
 
-def _copy(
-    file: Path, recovery: Recovery, on_bytes: Callable[[int], None], topics: Collection[str]
-) -> None:
+def _copy(file: Path, recovery: Recovery, on_bytes: Callable[[int], None]) -> None:
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     # The summary, if any, repeats all channels, in case the chunk that defines one is damaged.
@@ -117,7 +113,7 @@ def _copy(
             channels[record.id] = record
         if isinstance(record, Channel | Message):
             channel = record if isinstance(record, Channel) else channels.get(record.channel_id)
-            if channel is not None and (not topics or channel.topic in topics):
+            if channel is not None:
                 kept = _ensure_topic(channel, schemas.get(channel.schema_id), recovery)
                 if kept and isinstance(record, Message):
                     times_ns = record.log_time, record.publish_time

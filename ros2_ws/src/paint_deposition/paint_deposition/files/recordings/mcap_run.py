@@ -27,12 +27,11 @@ from paint_deposition.files.recordings.messages import Definition
 COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}
 
 
-def offered_qos(depth: int, reliable: bool = True, latched: bool = False) -> Qos:
-    """The QoS of a topic as rosbag2 stores it; a latched one is transient local."""
+def offered_qos(depth: int, latched: bool = False) -> Qos:
+    """The QoS of a reliable topic as rosbag2 stores it; a latched one is transient local."""
     history, liveliness = ros.QosHistory.KEEP_LAST, ros.QosLiveliness.AUTOMATIC
-    sent = ros.QosReliability.RELIABLE if reliable else ros.QosReliability.BEST_EFFORT
     kept = ros.QosDurability.TRANSIENT_LOCAL if latched else ros.QosDurability.VOLATILE
-    forever = ros.QosTime(9223372036, 854775807)
+    sent, forever = ros.QosReliability.RELIABLE, ros.QosTime(9223372036, 854775807)
     return Qos(history, depth, sent, kept, forever, forever, liveliness, forever, False)
 
 
