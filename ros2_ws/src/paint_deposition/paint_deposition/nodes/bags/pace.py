@@ -113,9 +113,7 @@ class FlowControl:
         self.status = 'starting'
         node.create_subscription(
             PoseProgress, PROGRESS_TOPIC,
-            lambda said: self.report(
-                said.reporter or None, stamp_ns(said.header), time.monotonic()
-            ),
+            lambda said: self.report(said.reporter, stamp_ns(said.header), time.monotonic()),
             PROGRESS,
         )  # fmt: skip
 
@@ -136,17 +134,16 @@ class FlowControl:
                 name: known.get(name) or Subscriber(self._sent, now_s) for name in sorted(names)
             }
 
-    def report(self, name: str | None, stamp_ns: int, now_s: float) -> None:
-        """Set the newest pose that a subscriber has taken, or all of them without a name."""
+    def report(self, name: str, stamp_ns: int, now_s: float) -> None:
+        """Set the newest pose that a subscriber has taken."""
         with self._lock:
             # Of poses with equal stamps, the newest.
             back = next((k for k, s in enumerate(reversed(self._stamps)) if s == stamp_ns), None)
             taken = 0 if back is None else self._sent - back
-            for known, subscriber in self.subscribers.items():
-                if name in (None, known):
-                    subscriber.reported_s = now_s
-                    if taken > subscriber.taken:
-                        subscriber.taken, subscriber.advanced_s = taken, now_s
+            if subscriber := self.subscribers.get(name):
+                subscriber.reported_s = now_s
+                if taken > subscriber.taken:
+                    subscriber.taken, subscriber.advanced_s = taken, now_s
 
     def lag(self, now_s: float) -> dict[str, int]:
         """Number of poses that each subscriber still has to take, and has not lost."""
