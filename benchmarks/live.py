@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ import numpy as np
 from benchmarks import file_to_film as side
 
 GUNS = ('robot_1', 'robot_2')
+NAMED = '[robot_1, robot_2]'
 RATE_HZ = 250
 SPEED_M_PER_S = 0.5
 RECORDER = 'run_recorder'
@@ -55,15 +57,15 @@ def start_simulator(running: ExitStack, folder: Path) -> tuple[subprocess.Popen,
     """The simulator on the folder's part, and the time to `ready` in its log [s]."""
     return start_node(
         running, folder, 'deposition_simulator', mesh_file=folder / 'part.stl',
-        max_edge_length_m=side.COARSER_THAN_ANY_M,
+        max_edge_length_m=side.COARSER_THAN_ANY_M, atomizers=NAMED,
     )  # fmt: skip
 
 
 def start_node(
     running: ExitStack, folder: Path, executable: str, **parameters: object
 ) -> tuple[subprocess.Popen, float]:
-    """A node of both guns, and the time to `ready` in its log [s]."""
-    parameters |= {'atomizers': f'[{", ".join(GUNS)}]', 'output_directory': folder}
+    """A node that ends with `running`, and the time to `ready` in its log [s]."""
+    parameters['output_directory'] = folder
     given = [part for name, value in parameters.items() for part in ('-p', f'{name}:={value}')]
     log = folder / f'{executable}.log'
     with log.open('wb') as file:
@@ -117,25 +119,25 @@ def watch(topic: str) -> None:
 
 
 class Robots:
-    """Publishes the poses of both guns, and notes when statistics arrive."""
+    """Publishes the poses of guns, '' for an only one, and notes when statistics arrive."""
 
-    def __init__(self) -> None:
+    def __init__(self, guns: Sequence[str]) -> None:
         import rclpy
         from geometry_msgs.msg import PoseStamped
         from paint_msgs.msg import AtomizerState, ThicknessStats
         from rclpy.qos import DurabilityPolicy, QoSProfile
 
         rclpy.init()
-        self._node = rclpy.create_node('robots')
-        profile = QoSProfile(depth=2000)
+        self.node = rclpy.create_node('robots')
+        profile, spaces = QoSProfile(depth=2000), [f'{gun}/' if gun else '' for gun in guns]
         self._poses, self._states = (
-            [self._node.create_publisher(kind, f'{gun}/atomizer/{topic}', profile) for gun in GUNS]
+            [self.node.create_publisher(kind, f'{of}atomizer/{topic}', profile) for of in spaces]
             for kind, topic in ((PoseStamped, 'pose'), (AtomizerState, 'state'))
         )
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._node.create_subscription(ThicknessStats, 'thickness/stats', self._note, latched)
+        self.node.create_subscription(ThicknessStats, 'thickness/stats', self._note, latched)
         self.arrived: list[tuple[int, int]] = []
-        self.received = 0
+        self.stats = ThicknessStats()
 
     def __enter__(self) -> 'Robots':
         return self
@@ -143,31 +145,42 @@ class Robots:
     def __exit__(self, *_: object) -> None:
         import rclpy
 
-        self._node.destroy_node()
+        self.node.destroy_node()
         rclpy.try_shutdown()
 
     def _note(self, stats: Any) -> None:
         stamp = stats.header.stamp
         self.arrived.append((stamp.sec * 1_000_000_000 + stamp.nanosec, time.time_ns()))
-        self.received = stats.poses_received
+        self.stats = stats
 
-    def _spin(self, seconds: float) -> None:
+    def spin(self, seconds: float) -> None:
+        """Take what comes for so long, or until something has come."""
         import rclpy
 
-        rclpy.spin_once(self._node, timeout_sec=max(0.0, seconds))
+        rclpy.spin_once(self.node, timeout_sec=max(0.0, seconds))
 
-    def wait_until_heard(self) -> None:
-        """Wait until the simulator listens to everything."""
+    def wait_until_heard(self, count: int = 1) -> None:
+        """Wait until so many nodes listen to everything."""
         deadline = time.monotonic() + HEARD_WITHIN_S
-        while not all(each.get_subscription_count() for each in (*self._poses, *self._states)):
+        publishers = *self._poses, *self._states
+        while not all(each.get_subscription_count() >= count for each in publishers):
             if time.monotonic() > deadline:
-                raise SystemExit('the simulator does not listen')
-            self._spin(0.05)
+                raise SystemExit('a node does not listen')
+            self.spin(0.05)
         for _ in range(10):
-            self._spin(0.05)
+            self.spin(0.05)
 
-    def paint(self, seconds: float) -> np.ndarray:
-        """Both guns to and fro, one on the upper and one on the lower half; the stamps [ns]."""
+    def paint(
+        self,
+        seconds: float,
+        rate_hz: int,
+        motion: Callable[[float, int], tuple[float, float, bool]],
+        on_time: Callable[[float], None] = lambda at_s: None,
+    ) -> np.ndarray:
+        """Send all guns' poses at this rate; the stamps [ns].
+
+        ``motion`` gives of a time [s] and the number of a gun x and z [m], and whether it sprays.
+        """
         from geometry_msgs.msg import PoseStamped
         from paint_msgs.msg import AtomizerState
         from rclpy.time import Time
@@ -177,29 +190,37 @@ class Robots:
         q, p = message.pose.orientation, message.pose.position
         q.x, q.w, p.y = -float(np.sqrt(0.5)), float(np.sqrt(0.5)), -side.STANDOFF_M
         began_s, stamps = time.monotonic(), []
-        for row in range(round(seconds * RATE_HZ)):
-            at_s = row / RATE_HZ
+        spraying: list[bool | None] = [None] * len(self._poses)
+        for row in range(round(seconds * rate_hz)):
+            at_s = row / rate_hz
             while (early_s := began_s + at_s - time.monotonic()) > 0.0:
-                self._spin(early_s)
+                self.spin(early_s)
             now = time.time_ns()
             message.header.stamp = Time(nanoseconds=now).to_msg()
             stamps.append(now)
-            number, along = divmod(at_s * SPEED_M_PER_S / side.LENGTH_M, 1.0)
             for gun, publisher in enumerate(self._poses):
-                p.x = side.LENGTH_M * (along if (number + gun) % 2 == 0 else 1.0 - along)
-                p.z = side.HEIGHT_M / 2 * (gun + (0.15 + 0.2 * number) % 1.0)
-                if row == 0:
-                    state = AtomizerState(spraying=True)
+                p.x, p.z, sprays = motion(at_s, gun)
+                if sprays != spraying[gun]:
+                    spraying[gun] = sprays
+                    state = AtomizerState(spraying=sprays)
                     state.header.stamp = message.header.stamp
                     self._states[gun].publish(state)
                 publisher.publish(message)
+            on_time(at_s)
         return np.array(stamps)
 
     def wait_for_all(self, count: int) -> None:
         """Wait for statistics of so many poses."""
         deadline = time.monotonic() + HEARD_WITHIN_S
-        while self.received < count and time.monotonic() < deadline:
-            self._spin(0.05)
+        while self.stats.poses_received < count and time.monotonic() < deadline:
+            self.spin(0.05)
+
+
+def to_and_fro(at_s: float, gun: int) -> tuple[float, float, bool]:
+    """One gun on the upper and one on the lower half."""
+    number, along = divmod(at_s * SPEED_M_PER_S / side.LENGTH_M, 1.0)
+    x = side.LENGTH_M * (along if (number + gun) % 2 == 0 else 1.0 - along)
+    return x, side.HEIGHT_M / 2 * (gun + (0.15 + 0.2 * number) % 1.0), True
 
 
 def ages_s(stamps_ns: np.ndarray, arrived: list[tuple[int, int]]) -> np.ndarray:
@@ -214,15 +235,15 @@ def measure(folder: Path, seconds: float, topic: str) -> dict[str, Any]:
     """One run of the cell with somebody who takes a topic, '' for nobody."""
     with ExitStack() as running:
         simulator, ready_s = start_simulator(running, folder)
-        robots = running.enter_context(Robots())
+        robots = running.enter_context(Robots(GUNS))
         robots.wait_until_heard()
         watcher = recorder = None
         if topic == RECORDER:
-            recorder, _ = start_node(running, folder, RECORDER, name='run')
+            recorder, _ = start_node(running, folder, RECORDER, name='run', atomizers=NAMED)
         elif topic:
             watcher = start_watching(running, topic)
         began_s, began_cpu_s = time.monotonic(), cpu_s(simulator)
-        stamps = robots.paint(seconds)
+        stamps = robots.paint(seconds, RATE_HZ, to_and_fro)
         lasted_s = time.monotonic() - began_s
         robots.wait_for_all(len(GUNS) * len(stamps))
         share = (cpu_s(simulator) - began_cpu_s) / lasted_s
@@ -240,7 +261,7 @@ def measure(folder: Path, seconds: float, topic: str) -> dict[str, Any]:
             'age_median_s': float(np.median(ages)),
             'age_95_s': float(np.quantile(ages, 0.95, method='higher')),
             'poses_sent': len(GUNS) * len(stamps),
-            'poses_received': robots.received,
+            'poses_received': robots.stats.poses_received,
             'messages_per_s': seen['messages'] / lasted_s,
             'mb_per_s': seen['bytes'] / lasted_s * 1e-6,
             'memory_mb': peak_mb(simulator),

@@ -21,7 +21,7 @@ def simulator_process(folder: Path, **parameters: object) -> 'NodeProcess':
     return NodeProcess(folder / 'simulator', 'deposition_simulator', mesh_file=mesh, **parameters)
 
 
-class NodeProcess:
+class NodeProcess(subprocess.Popen):
     """An executable that writes `<log>.out` and `<log>.err`, and is killed when a `with` ends."""
 
     def __init__(
@@ -33,7 +33,7 @@ class NodeProcess:
         ros_arguments: tuple[str, ...] = (),
         **parameters: object,
     ) -> None:
-        self._out, self._err = log.with_suffix('.out'), log.with_suffix('.err')
+        self._log = log
         program = code or (
             f'import sys; from paint_deposition.nodes.executables import {executable}; '
             f'sys.exit({executable}())'
@@ -43,52 +43,40 @@ class NodeProcess:
             for name, value in parameters.items()
             for part in ('-p', f'{name}:={str(value).lower() if value is True else value}')
         ]
-        with self._out.open('wb') as out, self._err.open('wb') as err:
-            self._process = subprocess.Popen(
+        with log.with_suffix('.out').open('wb') as out, log.with_suffix('.err').open('wb') as err:
+            super().__init__(
                 [sys.executable, '-c', program, '--ros-args', *arguments, *ros_arguments],
-                stdout=out,
-                stderr=err,
+                stdout=out, stderr=err, cwd=log.parent,
                 env=os.environ | {'PYTHONUNBUFFERED': '1'},
-                cwd=log.parent,
-            )
+            )  # fmt: skip
 
     @property
     def out(self) -> str:
-        return self._out.read_text()
+        return self._log.with_suffix('.out').read_text()
 
     @property
     def err(self) -> str:
-        return self._err.read_text()
+        return self._log.with_suffix('.err').read_text()
 
-    @property
-    def exit_code(self) -> int | None:
-        return self._process.poll()
-
-    def wait(self, timeout_s: float = 60.0) -> int:
-        return self._process.wait(timeout_s)
+    def wait(self, timeout: float | None = 60.0) -> int:
+        return super().wait(timeout)
 
     def interrupt_as_launch_does(self) -> None:
         """Ctrl-C under `ros2 launch`: one SIGINT from the terminal, and one from launch."""
-        self._process.send_signal(signal.SIGINT)
-        self._process.send_signal(signal.SIGINT)
-
-    def terminate(self) -> None:
-        self._process.terminate()
+        self.send_signal(signal.SIGINT)
+        self.send_signal(signal.SIGINT)
 
     def stall(self) -> None:
         """Stop the process where it is, as a debugger or a lack of memory does."""
-        self._process.send_signal(signal.SIGSTOP)
+        self.send_signal(signal.SIGSTOP)
 
     def go_on(self) -> None:
-        self._process.send_signal(signal.SIGCONT)
+        self.send_signal(signal.SIGCONT)
 
     def kill(self) -> None:
-        self._process.kill()
-        self._process.wait()
-
-    def __enter__(self) -> 'NodeProcess':
-        return self
+        super().kill()
+        self.wait()
 
     def __exit__(self, *_: object) -> None:
-        if self._process.poll() is None:
+        if self.poll() is None:
             self.kill()

@@ -16,12 +16,9 @@ from std_msgs.msg import Bool, Float64, UInt16
 from nodes import cell
 from nodes.cell import START_NS
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.atomizer_source import AtomizerSource
-from paint_deposition.nodes.frames import JointPoses
-from paint_deposition.nodes.node import ERROR
 from paint_deposition.nodes.topics import header
 from robot_arm import JOINTS, URDF, tip_poses
 
@@ -170,16 +167,14 @@ def test_a_signal_that_was_overtaken_takes_effect_with_the_newest(source, driver
     assert math.isnan(states[0].voltage_kv)
 
 
-def test_joint_states_that_are_refused_from_then_on_are_told(monkeypatch):
-    poses = JointPoses(Robot.read(URDF), 'joints', lambda *_: None)
-    for names in (JOINTS, JOINTS[:5]):
-        message = JointState(name=list(names), position=WAY[0, : len(names)].tolist())
-        poses.take('joints', message, {'source_timestamp': 0})
-    later_s = time.monotonic() + 10.0
-    monkeypatch.setattr(time, 'monotonic', lambda: later_s)
-    status = poses.status()
-    assert (status.level, 'joint states are refused: ' in status.message) == (ERROR, True)
-    assert 'wrist_roll' in status.message
+def test_joint_states_that_are_refused_from_then_on_are_told(source, driver, viewer, wait_until):
+    node, robot = source(), driver()
+    robot.move(stamps_from_now())
+    wait_until(lambda: node.poses_published == len(WAY), what='the poses')
+    robot.move(stamps_from_now(), names=JOINTS[:5], rows=WAY[:, :5])
+    told = 'joint states are refused: '
+    wait_until(lambda: viewer.reports('atomizer_source: robot', told, b'\x02'), what=told)
+    assert 'wrist_roll' in viewer.status('atomizer_source: robot').message
 
 
 def test_a_trigger_alone_switches_the_gun(source, ros_context, spin, wait_until, viewer, switched):

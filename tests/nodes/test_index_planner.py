@@ -69,7 +69,7 @@ def test_answer_is_the_recommendation_or_why_there_is_none(planner, ask, viewer,
         assert not answer.success
         assert words in answer.message
         assert '\n' not in answer.message
-        assert node.status().level == DiagnosticStatus.WARN
+        assert node.status()[0] == DiagnosticStatus.WARN
 
 
 def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path):

@@ -129,10 +129,10 @@ def test_a_zero_is_warned_of_once_film_is_expected_there(comparison, robot, read
     x, y, z, _, *rest = table[1].split(',')
     readings.write_text('\n'.join([table[0], ','.join([x, y, z, '0', *rest]), *table[2:]]))
     node = comparison()
-    assert node.status().level == OK
+    assert node.status()[0] == OK
     robot(node).send(MOTION)
-    wait_until(lambda: node.status().level == WARN, what='the warning')
-    assert '; 1 of 40 readings are 0 where the model expects' in node.status().message
+    wait_until(lambda: node.status()[0] == WARN, what='the warning')
+    assert '; 1 of 40 readings are 0 where the model expects' in node.status()[1]
 
 
 def test_bad_input_is_one_line(comparison):

@@ -163,9 +163,9 @@ def test_every_task_reports_each_period(ros_context, spin, onlooker, wait_until)
 
     def gun() -> Status:
         calls.append(1)
-        return Status(WARN, f'call {len(calls)}', {'poses': 3, 'gap s': 0.5})
+        return WARN, f'call {len(calls)}', {'poses': 3, 'gap s': 0.5}
 
-    node.report({'gun': gun, 'mesh': lambda: Status(OK, 'loaded')}, period_s=0.05)
+    node.report({'gun': gun, 'mesh': lambda: (OK, 'loaded', {})}, period_s=0.05)
     viewer = onlooker()
     spin(node)
     wait_until(lambda: len(viewer.heard['/diagnostics']) >= 3, what='diagnostics')

@@ -40,7 +40,7 @@ class Worker(PaintNode):
         if values['does'] == 'load at once':
             os.kill(os.getpid(), signal.SIGINT)
 
-    def _load_files(self):
+    def _configure(self):
         if self.values['does'] == 'refuse':
             raise PaintError('mesh none.stl does not exist; give a mesh')
         if 'load' in self.values['does']:

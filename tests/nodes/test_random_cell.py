@@ -144,7 +144,7 @@ class Cell(NodesOfACell):
     @invariant()
     def every_node_lives(self) -> None:
         if self.recorder:
-            assert self.recorder.exit_code is None, self.recorder.err
+            assert self.recorder.poll() is None, self.recorder.err
             assert not any(node.finished.done() for node in (self.simulator, self.page, self.egm))
             assert not self.egm.stream.sender
 

@@ -14,7 +14,7 @@ from files.recorded import POSE, START_NS, Messages, pose_entries, straight_pass
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.mcap_run import RunWriter
 from paint_deposition.files.recordings.messages import STATE_TEXT, STATE_TYPE, Definition, standard
 from paint_deposition.motion.transforms import Rigid
 
@@ -50,10 +50,10 @@ def test_topics_of_other_types_and_without_messages_are_no_candidates(tmp_path):
     written, messages = straight_pass(triggers=False), Messages()
     event = Definition('MSG: example_interfaces/srv/AddTwoInts_Event\nint64 a\n---\nint64 sum\n')
     with RunWriter(tmp_path / 'run') as run:
-        run.add_topic(RunTopic('/add/_service_event', 'example_interfaces/srv/Add_Event', event))
+        run.add_topic('/add/_service_event', 'example_interfaces/srv/Add_Event', event)
         run.write('/add/_service_event', b'\0\1\0\0', START_NS, START_NS)
         for topic in ('/empty', '/p'):
-            run.add_topic(RunTopic(topic, POSE, standard(POSE)))
+            run.add_topic(topic, POSE, standard(POSE))
         for topic, stamp, message in pose_entries(written, '/p'):
             run.write(topic, bytes(messages.serialised(message)), stamp, stamp)
     assert same(pd.read_recording(tmp_path / 'run'), written)

@@ -8,6 +8,7 @@ import pytest
 import yaml
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from rosbags.interfaces import QosReliability
 from rosbags.rosbag2 import Reader
 
 from files.recorded import straight_pass
@@ -15,7 +16,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
+from paint_deposition.files.recordings.mcap_run import RunWriter, offered_qos
 from paint_deposition.files.recordings.messages import standard
 
 BOOL = 'std_msgs/msg/Bool'
@@ -47,8 +48,9 @@ def test_whole_recordings_of_others_come_back_whole(tmp_path, shared_data, name)
 def cut_run(tmp_path):
     """A run cut in the middle of its third chunk or later; its custom data and QoS are special."""
     with RunWriter(tmp_path / 'run', {'mesh': 'door.stl'}, ros_distro='jazzy') as writer:
-        qos = [offered_qos(1, latched=True), offered_qos(7, reliable=False)]
-        writer.add_topic(RunTopic('/gun', BOOL, standard(BOOL), qos))
+        weak = offered_qos(7)._replace(reliability=QosReliability.BEST_EFFORT)
+        qos = [offered_qos(1, latched=True), weak]
+        writer.add_topic('/gun', BOOL, standard(BOOL), qos)
         rng = np.random.default_rng(3)
         for number in range(9_000):
             cdr = b'\0\1\0\0' + bytes([int(rng.integers(2))])
@@ -87,7 +89,7 @@ NESTED = '{a: ' * 600 + '1' + '}' * 600
 )
 def test_odd_metadata_in_a_file_do_not_keep_it_from_being_recovered(tmp_path, told):
     with RunWriter(tmp_path / 'run') as run:
-        run.add_topic(RunTopic('/gun', BOOL, standard(BOOL)))
+        run.add_topic('/gun', BOOL, standard(BOOL))
         run.write('/gun', b'\0\1\0\0\1', 1, 1)
         run._writer.add_metadata('rosbag2', {'serialized_metadata': told})
     recovery = recover(run.path, tmp_path / 'recovered')

@@ -14,7 +14,7 @@ from rosbags.rosbag2 import Reader
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
+from paint_deposition.files.recordings.mcap_run import RunWriter, offered_qos
 from paint_deposition.files.recordings.messages import standard
 
 BOOL = 'std_msgs/msg/Bool'
@@ -25,15 +25,15 @@ QOS_KEYS = {
 }  # fmt: skip
 
 
-def gun_topic(name='/gun', latched=True) -> RunTopic:
-    return RunTopic(name, BOOL, standard(BOOL), [offered_qos(1, latched=latched)])
+def gun_topic(name='/gun', latched=True) -> tuple:
+    return name, BOOL, standard(BOOL), [offered_qos(1, latched=latched)]
 
 
 @pytest.fixture
 def run(tmp_path):
     with RunWriter(tmp_path / 'run', {'mesh_sha256': 'ab12'}, ros_distro='kilted') as writer:
-        writer.add_topic(gun_topic())
-        writer.add_topic(gun_topic('/never', latched=False))
+        writer.add_topic(*gun_topic())
+        writer.add_topic(*gun_topic('/never', latched=False))
         writer.write('/gun', TRUE_CDR, log_time_ns=2_000, publish_time_ns=1_900)
         writer.write('/gun', FALSE_CDR, log_time_ns=5_000, publish_time_ns=4_900)
     return writer.folder
@@ -90,7 +90,7 @@ sys.path.insert(0, sys.argv[2])
 from files.recordings.test_mcap_run import TRUE_CDR, gun_topic
 
 writer = RunWriter(sys.argv[1])
-writer.add_topic(gun_topic())
+writer.add_topic(*gun_topic())
 start_s = time.monotonic()
 number = 0
 while True:
@@ -129,7 +129,7 @@ from paint_deposition.files.recordings.mcap_run import RunWriter
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
 with RunWriter(sys.argv[1], compression='none') as writer:
-    writer.add_topic(gun_topic())
+    writer.add_topic(*gun_topic())
     number = 0
     try:
         while True:
@@ -171,22 +171,14 @@ def test_text_is_what_rosbag2_wrote(shared_data):
         assert definitions.installed(name).text.encode() == schemas[name].data
 
 
-def test_standard_and_installed_types_have_one_hash():
-    pytest.importorskip('rclpy')
+def test_installed_types_have_the_standard_hash_and_bring_all_they_use():
+    pytest.importorskip('paint_msgs')
     for name in ('geometry_msgs/msg/PoseStamped', BOOL, 'sensor_msgs/msg/PointCloud2'):
         assert definitions.standard(name).type_hash == definitions.installed(name).type_hash
         assert definitions.standard(name).type_hash.startswith('RIHS01_')
-
-
-def test_own_messages_bring_all_they_use():
-    pytest.importorskip('paint_msgs')
     text = definitions.installed('paint_msgs/msg/ComparisonStats').text
     for used in ('std_msgs/Header', 'builtin_interfaces/Time', 'geometry_msgs/Point'):
         assert text.count(f'{definitions.SEPARATOR}\nMSG: {used}\n') == 1
-
-
-def test_a_type_that_is_not_installed_is_named():
-    pytest.importorskip('ament_index_python')
     for name in ('no_msgs/msg/Nothing', 'std_msgs/msg/Nothing'):
         with pytest.raises(RecordingError, match=f'{name} is not installed'):
             definitions.installed(name)

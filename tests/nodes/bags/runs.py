@@ -43,7 +43,8 @@ def offered(information: dict, topic: str) -> list[dict]:
 
 def messages(path) -> list[tuple[str, bytes]]:
     with open_bag(path) as bag:
-        return [(message.topic, message.cdr) for message in bag.messages()]
+        names = [topic.name for topic in bag.topics]
+        return [(message.topic, message.cdr) for message in bag.messages(names)]
 
 
 class Listener(Node):

@@ -18,7 +18,7 @@ from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.nodes.bags.pace import LOST_TIMEOUT_S, NO_REPORT_TIMEOUT_S, FlowControl
+from paint_deposition.nodes.bags.pace import LOST_TIMEOUT_S, FlowControl
 from robot_arm import JOINTS, URDF, sweep
 
 
@@ -180,8 +180,8 @@ def test_a_bag_that_breaks_off_later_ends_the_process(ros_domain, listen, wait_u
     path.write_bytes(content)
     listen()
     with NodeProcess(tmp_path / 'player', 'bag_player', bag=bag, rate='0.0') as process:
-        wait_until(lambda: process.exit_code is not None, what='the end')
-        assert process.exit_code == 2, process.err
+        wait_until(lambda: process.poll() is not None, what='the end')
+        assert process.returncode == 2, process.err
         assert f'run: paint recover {bag}' in process.err
 
 
@@ -261,20 +261,6 @@ def test_lost_poses_are_not_waited_for_while_reports_arrive(window):
     window.report('simulator', 6, now_s + 0.2)
     assert window.lag(now_s + 0.2) == {}
     assert window.subscribers['simulator'].lost == 3
-
-
-def test_a_subscriber_that_never_reports_is_not_waited_for(window):
-    """The others are waited for as before."""
-    window.set_subscribers(['mute', 'simulator'], 0.0)
-    published(window, range(10))
-    window.report('simulator', 7, 0.0)
-    assert window.lag(NO_REPORT_TIMEOUT_S - 0.1) == {'mute': 10, 'simulator': 2}
-    assert window.lag(NO_REPORT_TIMEOUT_S + 0.1) == {'simulator': 2}
-    assert window.subscribers['mute'].never_reported
-    published(window, range(10, 25), now_s=40.0)
-    window.report('simulator', 24, 40.0)
-    window.report('mute', 21, 40.0)
-    assert window.lag(40.0) == {'mute': 3}
 
 
 def test_only_present_subscribers_are_waited_for(window):

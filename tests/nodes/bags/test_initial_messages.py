@@ -9,7 +9,6 @@ from rclpy.serialization import deserialize_message, serialize_message
 from files.recorded import TF, Messages
 from nodes.cell import START_NS
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.nodes.bags.initial_messages import InitialMessages
 from paint_deposition.nodes.topics import header, state_message
 
@@ -42,8 +41,12 @@ def test_a_run_begins_with_what_its_part_carries_over_and_what_was_sent_since():
         sent(STATE, 2, 3, flow=1.0, brush=9), sent(POSE, 2, 4), sent(STATE, 3, 5, flow=0.0),
         sent(POSE, 3, 6),
     )  # fmt: skip
-    carried = [state_message('', TriggerChange(START_NS, 0.5, 2)),
-               state_message('', TriggerChange(START_NS + 4 * S, 1.0, 1))]  # fmt: skip
+    carried = [
+        state_message(
+            header=header('', START_NS + at_s * S), spraying=True, flow=flow, brush=brush
+        )
+        for at_s, flow, brush in ((0, 0.5, 2), (4, 1.0, 1))
+    ]
     part = Part(last_sent_ns=4 * S, guns=[''], states_sent_ns=[4 * S], states=carried)
     until_ns, early = memory.begin_part(part, 7 * S)
     assert until_ns == {POSE: 4 * S, STATE: 4 * S}

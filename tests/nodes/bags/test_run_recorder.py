@@ -27,7 +27,6 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.bags import run_recorder
 from paint_deposition.nodes.index_planner import IndexPlanner
@@ -147,7 +146,7 @@ def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose'), what='the first pose')
     until_ns = time.time_ns() + (5_000_000_000 if are_lost else 300_000_000)
     at = header('part', START_NS + 9)
-    carried = [state_message('', TriggerChange(START_NS + 5, 0.5))]
+    carried = [state_message(header=header('', START_NS + 5), spraying=True, flow=0.5)]
     sent = {'last_sent_ns': until_ns, 'states_sent_ns': [until_ns]}
     parts.publish(Part(run='1', header=at, guns=[''], states=carried, **sent))
     wait_until(lambda: recorder.run.folder.name == '1', what='the run')
@@ -241,7 +240,7 @@ def test_what_is_sent_before_its_publisher_is_heard_is_counted(record, cell, wai
     assert recorder.recorded['/new/atomizer/pose'].losses == (
         f'0 missed, {before_discovery} sent before the recorder heard their publisher'
     )
-    of_old = recorder.recorded['/old/atomizer/pose'].before_discovery
+    of_old = recorder.recorded['/old/atomizer/pose'].before_discovery.total()
     assert 0 < of_old < sent_before, 'by its rate, those since the recording began'
     assert f'{before_discovery} of /new/atomizer/pose sent before the' in recorder.summary()
 

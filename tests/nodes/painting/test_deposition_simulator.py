@@ -76,7 +76,7 @@ def test_a_large_mesh_costs_a_robot_at_250_hz_no_pose(simulator, onlooker, wait_
     motion = two_passes(poses=750, trigger=False)
     bag = write_pose_bag(tmp_path / 'motion', motion)
     with NodeProcess(tmp_path / 'player', 'bag_player', bag=bag) as replay:
-        wait_until(lambda: replay.exit_code is not None, what='the replay')
+        wait_until(lambda: replay.poll() is not None, what='the replay')
     wait_until(lambda: node.film.counts.received == len(motion), what='every pose painted')
     assert node.film.counts.rejected == 0
     assert node.inputs[0].steps.long == 0

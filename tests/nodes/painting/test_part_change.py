@@ -133,7 +133,7 @@ def test_the_gun_and_its_brush_stay(simulated, painted, change, wider, wait_unti
     node.set_parameters(parameters(model_file=str(tmp_path / 'other.yaml')))
     wait_until(lambda: not node.repainting, what='the end of the trial')
     assert 'brush 2 is not in the model' in node.model_problem
-    assert node.tasks['film']().values['model'] == str(tmp_path / 'brushes.yaml')
+    assert node.tasks['film']()[2]['model'] == str(tmp_path / 'brushes.yaml')
     source.send(later(WITHOUT_TRIGGER))
     assert painted(node, len(WITHOUT_TRIGGER)).max() > 1.0
     source.send_state(later(WITHOUT_TRIGGER).stamps_ns[-1], 0.0)
@@ -151,7 +151,7 @@ def test_meshes_are_read_once_for_each_shape_they_have(simulator, change, wider,
     assert 'third.stl is prepared: Surface(' in prepared.message
 
     def ready() -> str:
-        return node.parts.status().values['meshes prepared']
+        return node.parts.status()[2]['meshes prepared']
 
     assert ready() == third
     for serial, mesh, kept in (
@@ -233,19 +233,19 @@ def test_a_film_is_kept_until_it_is_on_disk(simulated, painted, change, tmp_path
         assert node.trigger_cleanup() == TransitionCallbackReturn.FAILURE
     assert node.configured
     unsaved = 'films of 1 former parts are not saved'
-    assert unsaved in node.tasks['state']().message
+    assert unsaved in node.tasks['state']()[1]
     node.trigger_activate()
     second = change(serial='2')
     assert (second.success, second.run, second.paths) == (True, '2', [])
     assert f'{unsaved}, and kept' in second.message
-    assert node.parts.status().level == ERROR
+    assert node.parts.status()[0] == ERROR
     folder.unlink()
     source.send(later(MOTION))
     painted(node, len(MOTION))
     third = change(serial='3')
     assert [Path(path).parent.name for path in third.paths] == 3 * ['1'] + 3 * ['2']
     assert saved_um(folder / '1/film.csv') == pytest.approx(film, rel=1e-7)
-    assert node.parts.status().level == OK
+    assert node.parts.status()[0] == OK
     node.trigger_deactivate()
     assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
     assert not node.configured

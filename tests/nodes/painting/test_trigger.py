@@ -101,7 +101,7 @@ def test_robots_are_heard_as_they_send(simulator, ros_context, spin, painted, wa
     first.send(UNTRIGGERED, slice(row, 600))
     assert 310 < row < 599
     wait_until(lambda: node.film.counts.received == 600, what='all poses')
-    assert node.film.counts.rejected == node.inputs[0].messages_lost == 0
+    assert node.film.counts.rejected == sum(topic.lost for topic in node.inputs[0].topics) == 0
 
 
 def test_no_more_is_asked_for(simulator, ros_context, spin, onlooker, wait_until, capfd):

@@ -8,19 +8,21 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from sensor_msgs.msg import JointState
 
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, Robot
 from paint_deposition.files.recordings.messages import Signal, stamp_ns
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, is_pose
-from paint_deposition.nodes.frames import QUEUE_DEPTH, SILENT_S, JointPoses, TfPoses
-from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status
+from paint_deposition.nodes.frames import QUEUE_DEPTH, SILENT_S, TfPoses
+from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
 from paint_deposition.nodes.topics import (
     POSE_DEPTH,
@@ -28,7 +30,7 @@ from paint_deposition.nodes.topics import (
     header,
     message_class,
     pose_message,
-    unknown_state,
+    state_message,
 )
 from paint_deposition.request import MotionOptions
 
@@ -102,41 +104,6 @@ class AtomizerSource(PaintNode):
         ),
     )
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
-        self._state_publisher = self.create_publisher(
-            AtomizerState, 'atomizer/state', LATCHED_STATES
-        )
-        # Topics that have no publisher yet, with their callbacks; joints may be signals, too.
-        self._missing: set[tuple[str, Callable[..., None]]] = {
-            (signal.topic, self._on_signal_message) for signal in self._signals.values()
-        }
-        self._values: dict[str, float] = {}
-        self._published, self._newest_ns = '', 0
-        self.poses_published = 0
-        # Of the robot's poses: their frame, when the last came, and how late they are sent.
-        self._base, self._pose_s, self._clock_offset_s = '', time.monotonic(), 0.0
-        # What computes the poses; None beside a robot that publishes them itself.
-        self._motion: JointPoses | TfPoses | None = None
-        base, joints = self.values['base_link'], self.values['joint_topic']
-        if self._robot is not None:
-            self._motion = JointPoses(self._robot, joints, self._publish_pose)
-            self._missing.add((joints, self._motion.take))
-        elif base:
-            tip = self.values['tip_link'] or DEFAULT_TIP
-            self._motion = TfPoses(self, base, tip, self._publish_pose)
-        if self._motion is None:
-            self.create_subscription(PoseStamped, POSES, self._watch_pose, qos_profile_sensor_data)
-        else:
-            self._base, depth = self._motion.base, QoSProfile(depth=POSE_DEPTH)
-            self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
-        self._problems: dict[str, str] = {}  # by topic
-        self._heard: list[AdaptiveSubscription] = []
-        if isinstance(self._motion, TfPoses):
-            self._heard += self._motion.topics
-        self.create_steady_timer(0.1, self._discover_topics)
-        self.report({'robot': self._robot_status, 'signals': self._signals_status})
-
     def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         if not any(values[name] for name in ('urdf_file', 'base_link', 'trigger')):
             raise PaintError(
@@ -151,20 +118,68 @@ class AtomizerSource(PaintNode):
             if values[name] and Signal.parse(values[name]) is None:
                 raise PaintError(f"{name} is '{values[name]}': give {SIGNAL}")
 
-    def _load_files(self) -> None:
+    def _configure(self) -> Mapping[str, Task]:
         values = self.values
-        self._robot = None
+        self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        named = {name: Signal.parse(values[name]) for name in SIGNALS}
+        self._signals = {name: signal for name, signal in named.items() if signal is not None}
+        self._state_publisher = self.create_publisher(
+            AtomizerState, 'atomizer/state', LATCHED_STATES
+        )
+        # Topics that have no publisher yet, with their callbacks; joints may be signals, too.
+        self._missing: set[tuple[str, Callable[..., None]]] = {
+            (signal.topic, self._on_signal_message) for signal in self._signals.values()
+        }
+        self._values: dict[str, float] = {}
+        self._published, self._newest_ns = '', 0
+        self.poses_published = 0
+        # Of the robot's poses: their frame, when the last came, and how late they are sent.
+        self._base, self._pose_s, self._clock_offset_s = '', time.monotonic(), 0.0
+        # How many joint states give none, and why the last does not, '' if it does.
+        self._incomplete, self._refusal = 0, ''
+        self._problems: dict[str, str] = {}  # by topic
+        self._heard: list[AdaptiveSubscription] = []
+        self._tf: TfPoses | None = None
         if values['urdf_file']:
             robot = Robot.read(
                 Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
             )
             prefix, unit = values['joint_prefix'], values['angle_unit'] or None
-            self._robot = replace(robot, joint_prefix=prefix, angle_unit=unit)
-        self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-        named = {name: Signal.parse(values[name]) for name in SIGNALS}
-        self._signals = {name: signal for name, signal in named.items() if signal is not None}
+            robot = replace(robot, joint_prefix=prefix, angle_unit=unit)
+            self._base, self._tip = robot.base, robot.tip
+            self._missing.add((values['joint_topic'], partial(self._take_joints, robot)))
+        elif values['base_link']:
+            tip = values['tip_link'] or DEFAULT_TIP
+            self._tf = TfPoses(self, values['base_link'], tip, self._publish_pose)
+            self._base, self._tip = self._tf.base, self._tf.tip
+            self._heard += self._tf.topics
+        if self._base:
+            depth = QoSProfile(depth=POSE_DEPTH)
+            self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
+        else:  # a robot publishes them itself
+            self.create_subscription(PoseStamped, POSES, self._watch_pose, qos_profile_sensor_data)
+        self.create_steady_timer(0.1, self._discover_topics)
+        return {'robot': self._robot_status, 'signals': self._signals_status}
 
     # --- poses
+
+    def _take_joints(
+        self, robot: Robot, topic: str, message: JointState, info: Mapping[str, Any]
+    ) -> None:
+        """Publish the pose for a joint state, which needs all joints."""
+        positions_by_name = dict(zip(message.name, message.position, strict=False))
+        try:
+            found = robot.recorded_joints(positions_by_name, topic)
+            values = np.array([[found[name] for name in robot.moving_joints]])
+            if not np.isfinite(values).all():
+                raise RecordingError(f'{topic} has joints that are not finite')
+            positions, quaternions = robot.poses(robot.in_si(values, topic))
+        except RecordingError as error:
+            self._incomplete, self._refusal = self._incomplete + 1, str(error)
+            return
+        self._pose_s, self._refusal = time.monotonic(), ''
+        tip = Rigid.of([*positions[0], *quaternions[0]])
+        self._publish_pose(stamp_ns(message.header), tip, info['source_timestamp'])
 
     def _publish_pose(self, stamp: int, tip: Rigid, sent_ns: int) -> None:
         if sent_ns:
@@ -236,11 +251,12 @@ class AtomizerSource(PaintNode):
             return
         full = self.values['calibrated_flow']
         speed = self._values.get('speed', math.nan) * self.values['speed_scale']
-        state = unknown_state()
-        state.spraying = bool(self._signals['trigger'].is_on(self._values['trigger']))
-        state.flow = self._values.get('flow', full) / full
-        state.brush = int(self._values.get('brush', ONLY_BRUSH))
-        state.programmed_speed_m_per_s = speed
+        state = state_message(
+            spraying=bool(self._signals['trigger'].is_on(self._values['trigger'])),
+            flow=self._values.get('flow', full) / full,
+            brush=int(self._values.get('brush', ONLY_BRUSH)),
+            programmed_speed_m_per_s=speed,
+        )
         if str(state) != self._published:  # NaN does not equal itself
             self._published = str(state)
             state.header = header(self._base, at_ns)
@@ -249,15 +265,27 @@ class AtomizerSource(PaintNode):
     # --- diagnostics
 
     def _robot_status(self) -> Status:
-        if self._motion is None:
-            if time.monotonic() - self._pose_s > SILENT_S:
+        is_silent = time.monotonic() - self._pose_s > SILENT_S
+        if self._tf is None and not self.values['urdf_file']:
+            if is_silent:
                 remedy = 'if none are to come, give urdf_file or base_link'
-                return Status(WARN, f'no poses on {POSES}; {remedy}')
-            return Status(OK, 'the robot publishes its poses')
-        found = self._motion.status()
-        poses = f"of '{self._motion.tip}' in '{self._base}'"
-        values = {'poses': poses, 'published': self.poses_published, **found.values}
-        return Status(found.level, found.message, values)
+                return WARN, f'no poses on {POSES}; {remedy}', {}
+            return OK, 'the robot publishes its poses', {}
+        values: dict[str, object] = {
+            'poses': f"of '{self._tip}' in '{self._base}'", 'published': self.poses_published,
+        }  # fmt: skip
+        if self._tf is not None:
+            level, words, figures = self._tf.status()
+            return level, words, {**values, **figures}
+        file = Path(self.values['urdf_file'])
+        values |= {'robot': file, 'joint states refused': self._incomplete}
+        if self._incomplete and not self.poses_published:
+            return ERROR, f'no joint state has all joints: {self._refusal}', values
+        if is_silent and self._refusal:
+            return ERROR, f'joint states are refused: {self._refusal}', values
+        if is_silent:
+            return WARN, f'no joint states on {self.values["joint_topic"]}', values
+        return OK, 'following the robot', values
 
     def _signals_status(self) -> Status:
         values = {
@@ -265,8 +293,8 @@ class AtomizerSource(PaintNode):
             for name, signal in self._signals.items()
         }
         if problems := [problem for problem in self._problems.values() if problem]:
-            return Status(ERROR, '; '.join(problems), values)
+            return ERROR, '; '.join(problems), values
         missing = [name for name, value in values.items() if value == 'not received']
         if missing:
-            return Status(WARN, f'not received: {" ".join(missing)}', values)
-        return Status(OK, 'following the signals' if values else 'no signal is named', values)
+            return WARN, f'not received: {" ".join(missing)}', values
+        return OK, 'following the signals' if values else 'no signal is named', values

@@ -22,7 +22,7 @@ from paint_msgs.msg import AtomizerState
 from paint_deposition.errors import PaintError, quoted
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.nodes.atomizer_source import LATCHED_STATES
-from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status
+from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed
 from paint_deposition.nodes.topics import header
 
@@ -65,8 +65,7 @@ class SignalSource(PaintNode):
     # Connects and takes the signals until ``stopped``; errors are told, then retried.
     follow: Callable[[], None]
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
+    def _configure(self) -> Mapping[str, Task]:
         self._publisher = self.create_publisher(AtomizerState, 'atomizer/state', LATCHED_STATES)
         named = ('trigger', *FIELDS)
         self.signals = {self.values[kind]: kind for kind in named if self.values[kind]}
@@ -80,8 +79,8 @@ class SignalSource(PaintNode):
         self._silent: set[str] = set()
         self._lock = threading.Lock()
         self._lags_s: deque[float] = deque(maxlen=50)
-        self.report({'signals': self.status})
         self.start_thread(self._keep_following)
+        return {'signals': self.status}
 
     def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         if urlsplit(values['url']).username is not None:
@@ -169,11 +168,11 @@ class SignalSource(PaintNode):
             self.get_logger().error(problem)
         self._logged = {*problems}
         if problems:
-            return Status(ERROR, '; '.join(problems), values)
+            return ERROR, '; '.join(problems), values
         missing = [name for name, value in received.items() if value == 'not received']
         if missing:
-            return Status(WARN, f'not received: {"; ".join(missing)}', values)
-        return Status(OK, 'following the signals', values)
+            return WARN, f'not received: {"; ".join(missing)}', values
+        return OK, 'following the signals', values
 
 
 class RwsSource(SignalSource):

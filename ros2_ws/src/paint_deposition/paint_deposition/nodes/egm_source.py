@@ -3,6 +3,7 @@
 import socket
 import time
 from collections import deque
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
@@ -12,7 +13,7 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status
+from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed
 from paint_deposition.nodes.topics import POSE_DEPTH, header, pose_message
 
@@ -204,16 +205,6 @@ class EgmSource(PaintNode):
         ),
     )  # fmt: skip
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
-        profile = QoSProfile(depth=POSE_DEPTH)
-        self._poses = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
-        self._joints = self.create_publisher(JointState, 'joint_states', profile)
-        self.stream = EgmStream(round(1e9 * self.values['lag_s']))
-        self._heard_s, self._lacks = time.monotonic(), ''
-        self.report({'robot': self.status})
-        self.start_thread(self._listen)
-
     def _validate(self, values: Any, changed: set[str]) -> None:
         egm_message()
         if len(values['external_joints']) != len(values['external_scales']):
@@ -222,7 +213,7 @@ class EgmSource(PaintNode):
                 f'{len(values["external_scales"])} external_scales; give one scale a joint'
             )
 
-    def _load_files(self) -> None:
+    def _configure(self) -> Mapping[str, Task]:
         address = self.values['address'], self.values['port']
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -234,6 +225,13 @@ class EgmSource(PaintNode):
                 'what else listens there, or give another port'
             ) from None
         self._socket.settimeout(0.2)
+        profile = QoSProfile(depth=POSE_DEPTH)
+        self._poses = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
+        self._joints = self.create_publisher(JointState, 'joint_states', profile)
+        self.stream = EgmStream(round(1e9 * self.values['lag_s']))
+        self._heard_s, self._lacks = time.monotonic(), ''
+        self.start_thread(self._listen)
+        return {'robot': self.status}
 
     def close(self) -> None:
         super().close()
@@ -242,37 +240,36 @@ class EgmSource(PaintNode):
             f'{heard.received} packets, {heard.lost} lost, {heard.repeated} repeated'
         )
 
-    def destroy_node(self) -> None:
-        super().destroy_node()
-        self._socket.close()
-
     def _listen(self) -> None:
         frame_id, names = self.values['frame_id'], self.values['joint_names']
         external = self.values['external_joints']
-        while not self.stopped.is_set():
-            try:
-                packet, (sender, _) = self._socket.recvfrom(65_536)
-            except TimeoutError:
-                continue
-            arrived_ns = time.time_ns()
-            if self.values['robot_address'] not in ('', sender):
-                self.stream.invalid += 1
-            elif position := self.stream.take(packet, arrived_ns, sender):
-                self._heard_s = time.monotonic()
-                stamp, pose, joints, axes = position
-                self._lacks = ''
-                if len(axes) < len(external):
-                    self._lacks = f'{len(axes)} external axes, and external_joints has more'
-                if pose is None:
-                    self._lacks = 'no pose: give EGM a tool and a frame'
-                else:
-                    self._poses.publish(pose_message(frame_id, stamp, pose))
-                if len(joints) >= len(names) and len(axes) >= len(external):
-                    scaled = axes[: len(external)] * self.values['external_scales']
-                    positions = [*joints[: len(names)].tolist(), *scaled.tolist()]
-                    at = header(frame_id, stamp)
-                    message = JointState(header=at, name=[*names, *external], position=positions)
-                    self._joints.publish(message)
+        with self._socket:
+            while not self.stopped.is_set():
+                try:
+                    packet, (sender, _) = self._socket.recvfrom(65_536)
+                except TimeoutError:
+                    continue
+                arrived_ns = time.time_ns()
+                if self.values['robot_address'] not in ('', sender):
+                    self.stream.invalid += 1
+                elif position := self.stream.take(packet, arrived_ns, sender):
+                    self._heard_s = time.monotonic()
+                    stamp, pose, joints, axes = position
+                    self._lacks = ''
+                    if len(axes) < len(external):
+                        self._lacks = f'{len(axes)} external axes, and external_joints has more'
+                    if pose is None:
+                        self._lacks = 'no pose: give EGM a tool and a frame'
+                    else:
+                        self._poses.publish(pose_message(frame_id, stamp, pose))
+                    if len(joints) >= len(names) and len(axes) >= len(external):
+                        scaled = axes[: len(external)] * self.values['external_scales']
+                        positions = [*joints[: len(names)].tolist(), *scaled.tolist()]
+                        at = header(frame_id, stamp)
+                        message = JointState(
+                            header=at, name=[*names, *external], position=positions
+                        )
+                        self._joints.publish(message)
 
     def status(self) -> Status:
         stream, values = self.stream, self.values
@@ -287,15 +284,13 @@ class EgmSource(PaintNode):
         }  # fmt: skip
         if time.time_ns() - stream.other_ns < 10_000_000_000:
             remedy = 'give each robot a port and a node of its own, or robot_address'
-            return Status(ERROR, f'{stream.other} sends, too: {remedy}', figures)
+            return ERROR, f'{stream.other} sends, too: {remedy}', figures
         if time.monotonic() - self._heard_s > 2.0:
-            return Status(
-                WARN, f'no packets on UDP port {values["port"]}: start EGMStreamStart with the '
-                'address of this machine in UDPUC', figures,
-            )  # fmt: skip
+            remedy = 'start EGMStreamStart with the address of this machine in UDPUC'
+            return WARN, f'no packets on UDP port {values["port"]}: {remedy}', figures
         if self._lacks:
-            return Status(ERROR, f'packets have {self._lacks}', figures)
+            return ERROR, f'packets have {self._lacks}', figures
         if stream.lost or stream.repeated or stream.invalid:
             words = f'{stream.lost} packets lost, {stream.repeated} repeated'
-            return Status(WARN, f'{words}, {stream.invalid} no EgmRobot', figures)
-        return Status(OK, 'following the robot', figures)
+            return WARN, f'{words}, {stream.invalid} no EgmRobot', figures
+        return OK, 'following the robot', figures

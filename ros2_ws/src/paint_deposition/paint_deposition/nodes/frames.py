@@ -1,4 +1,4 @@
-"""Poses by way of frames: into that of the part, and of a robot's tip from its joints or tf."""
+"""Poses by way of frames: into that of the part, and of the tip of a robot."""
 
 import contextlib
 import time
@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from rclpy.publisher import Publisher
-from sensor_msgs.msg import JointState
 
-from paint_deposition.errors import PaintError, RecordingError, did_you_mean
-from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.errors import PaintError, did_you_mean
 from paint_deposition.files.recordings.messages import pose_of, stamp_ns, transforms_of
 from paint_deposition.motion.transforms import (
     LONGEST_GAP_NS,
@@ -32,8 +30,11 @@ from paint_deposition.nodes.topics import AdaptiveSubscription, header
 TF_TIMEOUT_S = 1e-9 * LONGEST_GAP_NS
 # Position (3,) [m] and quaternion (4,).
 Place = tuple[np.ndarray, np.ndarray]
+# Poses that wait, in order, for their transform, and since when [monotonic s].
+TfQueue = deque[tuple[float, PoseStamped]]
 # (stamp [ns], pose of the tip, when it was sent [ns] or 0)
 TakePose = Callable[[int, Rigid, int], None]
+# Without poses or transforms for so long, that is reported.
 SILENT_S = 2.0
 # Deep queues that are emptied before poses are judged: a busy node has its transforms.
 QUEUE_DEPTH = 5000
@@ -46,7 +47,7 @@ def subscribe_to_tf(
     from tf2_msgs.msg import TFMessage
 
     def take_static(message: Any, _info: Any) -> None:
-        for child, parent, _, pose in transforms_of(message):
+        for child, parent, _, pose in transforms_of(message.transforms):
             tree.fix(child, parent, pose)
 
     subscribe = partial(AdaptiveSubscription, node, TFMessage, depth=QUEUE_DEPTH, polled=polled)
@@ -75,7 +76,7 @@ class PartFrame:
             self.tf_topics = subscribe_to_tf(node, self.tree, self._take)
 
     def _take(self, message: Any, _info: Any) -> None:
-        for transform in transforms_of(message):
+        for transform in transforms_of(message.transforms):
             self.tree.add(*transform)
 
     def set_part_pose(self, parent_frame: str, part_pose: Sequence[float]) -> None:
@@ -119,76 +120,30 @@ class PartFrame:
             raise NoTransform(f'{missing}; {remedy}', may_come) from None
         return into_part.applied(*pose)
 
+    def placed_in_order(
+        self, waiting: TfQueue
+    ) -> Iterator[tuple[PoseStamped, Place | NoTransform]]:
+        """Take poses from a queue, the oldest first, until one has to wait for its transform.
 
-# Poses that wait, in order, for their transform, and since when [monotonic s].
-TfQueue = deque[tuple[float, PoseStamped]]
+        As in tf2's MessageFilter, it delays all behind it. It is given up if the transform cannot
+        come any more, after `TF_TIMEOUT_S`, or if more than 5000 poses wait.
 
-
-def placed_in_order(
-    waiting: TfQueue, place: Callable[[PoseStamped], Place], now_s: float
-) -> Iterator[tuple[PoseStamped, Place | NoTransform]]:
-    """Take poses from a queue, the oldest first, until one has to wait for its transform.
-
-    As in tf2's MessageFilter, it delays all behind it. It is given up if the transform cannot come
-    any more, after `TF_TIMEOUT_S`, or if more than 5000 poses wait.
-
-    Yields:
-        Each pose, and its place or why it has none.
-    """
-    while waiting:
-        since_s, pose = waiting[0]
-        placed: Place | NoTransform
-        try:
-            placed = place(pose)
-        except NoTransform as missing:
-            in_time = now_s - since_s < TF_TIMEOUT_S and len(waiting) <= 5000
-            if missing.may_come and in_time:
-                return
-            placed = missing
-        waiting.popleft()
-        yield pose, placed
-
-
-class JointPoses:
-    """Computes the pose of link `tip` in `base` from each joint state, which needs all joints.
-
-    `topic` is that of the joint states, for messages; `take_pose` is called with each pose.
-    """
-
-    def __init__(self, robot: Robot, topic: str, take_pose: TakePose) -> None:
-        self.base, self.tip = robot.base, robot.tip
-        self._robot, self._topic, self._take_pose = robot, topic, take_pose
-        self._poses = self._incomplete = 0
-        self._refusal = ''
-        self._received_s = time.monotonic()
-
-    def take(self, _topic: str, message: JointState, info: Mapping[str, Any]) -> None:
-        """Compute the pose for a joint state; the callback of its subscription."""
-        positions_by_name = dict(zip(message.name, message.position, strict=False))
-        try:
-            found = self._robot.recorded_joints(positions_by_name, self._topic)
-            values = np.array([[found[name] for name in self._robot.moving_joints]])
-            if not np.isfinite(values).all():
-                raise RecordingError(f'{self._topic} has joints that are not finite')
-            positions, quaternions = self._robot.poses(self._robot.in_si(values, self._topic))
-        except RecordingError as error:
-            self._incomplete, self._refusal = self._incomplete + 1, str(error)
-            return
-        self._received_s, self._refusal = time.monotonic(), ''
-        tip = Rigid.of([*positions[0], *quaternions[0]])
-        self._poses += 1
-        self._take_pose(stamp_ns(message.header), tip, info['source_timestamp'])
-
-    def status(self) -> Status:
-        """Whether joint states arrive, and have all joints."""
-        values = {'robot': self._robot.path, 'joint states refused': self._incomplete}
-        if self._incomplete and not self._poses:
-            return Status(ERROR, f'no joint state has all joints: {self._refusal}', values)
-        if time.monotonic() - self._received_s > SILENT_S:
-            if self._refusal:
-                return Status(ERROR, f'joint states are refused: {self._refusal}', values)
-            return Status(WARN, f'no joint states on {self._topic}', values)
-        return Status(OK, 'following the robot', values)
+        Yields:
+            Each pose, and its place or why it has none.
+        """
+        now_s = time.monotonic()
+        while waiting:
+            since_s, pose = waiting[0]
+            placed: Place | NoTransform
+            try:
+                placed = self.on_part(pose)
+            except NoTransform as missing:
+                in_time = now_s - since_s < TF_TIMEOUT_S and len(waiting) <= 5000
+                if missing.may_come and in_time:
+                    return
+                placed = missing
+            waiting.popleft()
+            yield pose, placed
 
 
 class TfPoses:
@@ -228,7 +183,7 @@ class TfPoses:
 
     def _take(self, message: Any, info: Mapping[str, Any]) -> None:
         """Take moving transforms, and look up the poses that all transforms are now known for."""
-        for child, parent, stamp, pose in transforms_of(message):
+        for child, parent, stamp, pose in transforms_of(message.transforms):
             stamps = [stamp]
             if self._tree.add(child, parent, stamp, pose):
                 # The first of the restarted stream could have been a late one.
@@ -268,14 +223,14 @@ class TfPoses:
             'failed lookups': self._failed_lookups,
         }
         if not frames:
-            return Status(WARN, 'no transforms on /tf', values)
+            return WARN, 'no transforms on /tf', values
         for name in (self.tip, self.base):
             if name not in frames:
                 known = did_you_mean(name, frames)
-                return Status(ERROR, f"tf has no frame '{name}'; {known}", values)
+                return ERROR, f"tf has no frame '{name}'; {known}", values
         if not self._moving:
             reason = f"no moving transforms connect '{self.tip}' to '{self.base}'"
-            return Status(ERROR, reason, values)
+            return ERROR, reason, values
         if time.monotonic() - self._received_s > SILENT_S:
-            return Status(WARN, 'no new transforms of the robot on /tf', values)
-        return Status(OK, 'following the robot', values)
+            return WARN, 'no new transforms of the robot on /tf', values
+        return OK, 'following the robot', values

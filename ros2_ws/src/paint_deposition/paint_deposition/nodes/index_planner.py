@@ -20,7 +20,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes import topics
-from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.painting.painting_parameters import (
     model_from_parameters,
     model_parameters,
@@ -74,10 +74,13 @@ class IndexPlanner(PaintNode):
         ),
     )
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
+    def _configure(self) -> Mapping[str, Task]:
+        self._model = model_from_parameters(self.values)
+        self._path_publisher = self.create_publisher(Path, 'planned_path', topics.LATCHED)
+        if self.values['mesh_file']:
+            self._plan({})
         self._requests = 0
-        self._last = Status(OK, 'no request yet')
+        self._last = OK, 'no request yet'
         self.create_service(RecommendIndex, 'recommend_index', self._recommend)
         self._planning = ThreadPoolExecutor(max_workers=1, thread_name_prefix='plan_passes')
         self._closed = False
@@ -86,13 +89,7 @@ class IndexPlanner(PaintNode):
             callback_group=ReentrantCallbackGroup(),
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )  # fmt: skip
-        self.report({'index': self.status})
-
-    def _load_files(self) -> None:
-        self._model = model_from_parameters(self.values)
-        self._path_publisher = self.create_publisher(Path, 'planned_path', topics.LATCHED)
-        if self.values['mesh_file']:
-            self._plan({})
+        return {'index': self.status}
 
     def close(self) -> None:
         """Cancel the goal that is under way, and destroy the action server."""
@@ -127,10 +124,10 @@ class IndexPlanner(PaintNode):
             )
             answer = recommend(self._selected_model(), index_request)
         except (PaintError, MemoryError) as error:
-            self._last = Status(WARN, str(error) or 'not enough memory')
-            response.message = self._last.message
+            self._last = WARN, str(error) or 'not enough memory'
+            _, response.message = self._last
             return response
-        self._last = Status(OK, answer.sentence)
+        self._last = OK, answer.sentence
         response.success = True
         response.message = '; '.join([answer.sentence, *answer.notes])
         for name in ('index_m', 'sigma_n', 'mean_um', 'speed_m_per_s', 'travel'):
@@ -246,7 +243,7 @@ class IndexPlanner(PaintNode):
             'effects': ' '.join(effect.id for effect in self._model.effects) or 'none',
             'requests': self._requests,
         }
-        return Status(self._last.level, self._last.message, values)
+        return *self._last, values
 
 
 def _path_message(trajectory: Trajectory, start_ns: int) -> Path:

@@ -1,12 +1,12 @@
 """Managed (lifecycle) nodes, which can also configure and activate themselves."""
 
-from collections.abc import Callable, Mapping
+from functools import partialmethod
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.node import ERROR, OK, PaintNode, Status, Task
+from paint_deposition.nodes.node import ERROR, OK, PaintNode, Status
 from paint_deposition.nodes.parameters import NodeParameter, ParameterTable, fixed
 
 MANAGED = fixed(
@@ -20,7 +20,7 @@ MANAGED = fixed(
 ENTITIES = ('publisher', 'subscription', 'service', 'client', 'timer')
 
 
-class ManagedNode(LifecycleNodeMixin, PaintNode):
+class ManagedNode(PaintNode, LifecycleNodeMixin):
     """A node with the lifecycle of a managed node of ROS 2.
 
     `configure` reads its files and creates its topics and services; `activate` starts its work.
@@ -36,14 +36,10 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     autostarting = False
     _failure: Exception | None = None
 
-    def __init__(self, **kwargs: Any):
+    def _start(self) -> None:
         # The entities that `configure` created, and those that `activate` created.
         self._created: list[set[Any]] = []
-        # The mixin does not pass arguments on; it is initialised once the node exists.
-        PaintNode.__init__(self, **kwargs)
-
-    def _start(self) -> None:
-        LifecycleNodeMixin.__init__(self)
+        LifecycleNodeMixin.__init__(self)  # now that the node exists
         self.report({'state': self._state_status})
         self.autostarting = self.values['autostart']
         if not self.autostarting:
@@ -56,14 +52,6 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         self.autostarting = False
 
     # --- for the subclass
-
-    def _configure(self) -> Mapping[str, Task]:
-        """Create what the configured node has, whose files have been read.
-
-        Returns:
-            Its diagnostic tasks, by name.
-        """
-        return {}
 
     def _activate(self) -> None:
         """Start working."""
@@ -98,33 +86,13 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     # --- transitions
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('configured', self._enter)
-
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('activated', self._enter)
-
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('deactivated', self._leave, True)
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('cleaned up', self._leave, True)
-
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._transition_result('shut down', self.close, True)
-
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.close()
-        return TransitionCallbackReturn.SUCCESS
-
-    def _transition_result(
-        self, done: str, transition: Callable[[], None], needs_rest: bool = False
-    ) -> TransitionCallbackReturn:
+    def _transition(self, done: str, step: str, state: LifecycleState) -> TransitionCallbackReturn:
+        """Do the step of that name; `done` says what the node is then."""
         self._failure = None
         try:
-            if needs_rest and self.awaiting:
+            if step != '_enter' and self.awaiting:
                 raise PaintError('a request is under way: call again after it')
-            transition()
+            getattr(self, step)()
         except Exception as error:
             self._failure = error
             if not self.autostarting:  # else the process ends with this error
@@ -133,6 +101,16 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
             return TransitionCallbackReturn.FAILURE if expected else TransitionCallbackReturn.ERROR
         if not self.autostarting:
             self.get_logger().info(done)
+        return TransitionCallbackReturn.SUCCESS
+
+    on_configure = partialmethod(_transition, 'configured', '_enter')
+    on_activate = partialmethod(_transition, 'activated', '_enter')
+    on_deactivate = partialmethod(_transition, 'deactivated', '_leave')
+    on_cleanup = partialmethod(_transition, 'cleaned up', '_leave')
+    on_shutdown = partialmethod(_transition, 'shut down', 'close')
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.close()
         return TransitionCallbackReturn.SUCCESS
 
     def _enter(self) -> None:
@@ -144,8 +122,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
                 self._activate()
             else:
                 self._lasting = before
-                super()._start()
-                self.tasks = {**self._configure(), 'state': self._state_status}
+                self.tasks = {**self._load(), 'state': self._state_status}
         except BaseException:
             self._created.pop()
             self._destroy(self._entities - before)
@@ -170,7 +147,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
             if not self.configured:
                 # An aggregator would report a status that is no longer published as stale.
                 for task in self.tasks.keys() - {'state'}:
-                    self.tasks[task] = lambda: Status(OK, 'the node is not configured')
+                    self.tasks[task] = lambda: (OK, 'the node is not configured', {})
 
     @property
     def _entities(self) -> set[Any]:
@@ -184,8 +161,8 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     def _state_status(self) -> Status:
         label = self._state_machine.current_state[1]
         if self._failure is not None:
-            return Status(ERROR, f'{label}: {_error_text(self._failure)}')
-        return Status(OK, label)
+            return ERROR, f'{label}: {_error_text(self._failure)}', {}
+        return OK, label, {}
 
 
 def _error_text(error: Exception) -> str:

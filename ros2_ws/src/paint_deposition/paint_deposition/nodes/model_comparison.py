@@ -21,7 +21,6 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.node import OK, WARN, Status, Task
 from paint_deposition.nodes.painting.film_display import legend
-from paint_deposition.nodes.painting.health import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.parameters import CONFIGURED, NodeParameter, fixed
@@ -59,26 +58,23 @@ class ModelComparison(PaintingNode):
     PRECISION = 'double'
 
     def _configure(self) -> Mapping[str, Task]:
-        super()._configure()
-        latched = partial(self.create_publisher, qos_profile=topics.LATCHED)
-        self._mesh_publisher = latched(Marker, 'comparison/mesh')
-        self._stats_publisher = latched(ComparisonStats, 'comparison/stats')
-        self._legend_publisher = latched(MarkerArray, 'comparison/legend')
-        self.create_service(Trigger, '~/compare', lambda *_: self._compare())
-        self._publish_legend()
-        self.publish()
-        return painting_tasks(self) | {'comparison': self.status}
-
-    # --- the part and its readings
-
-    def _load_files(self) -> None:
         if not self.values['measurements_file']:
             raise PaintError('model_comparison: measurements_file is empty: give gauge readings')
         self._is_read = False
         self.readings = read_readings(self.values['measurements_file'])
         self.get_logger().info(self.readings.understood)
         self._noise = gauge_noise(self.readings)
-        super()._load_files()
+        tasks = super()._configure()
+        latched = partial(self.create_publisher, qos_profile=topics.LATCHED)
+        self._mesh_publisher = latched(Marker, 'comparison/mesh')
+        self._stats_publisher = latched(ComparisonStats, 'comparison/stats')
+        self._legend_publisher = latched(MarkerArray, 'comparison/legend')
+        self.create_service(Trigger, '~/compare', lambda *_: self._compare())
+        self._legend_publisher.publish(legend(self._scale, self.surface, self.frame.frame_id))
+        self.publish()
+        return {**tasks, 'comparison': self.status}
+
+    # --- the part and its readings
 
     def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
         motionless = SprayPath.empty()
@@ -115,7 +111,8 @@ class ModelComparison(PaintingNode):
     def _on_change(self, names: set[str]) -> None:
         super()._on_change(names)
         if 'color_max_um' in names:
-            self._publish_legend()
+            bar = legend(self._scale, self.surface, self.frame.frame_id)
+            self._legend_publisher.publish(bar)
         self._shown = None
 
     # --- publishing
@@ -160,10 +157,6 @@ class ModelComparison(PaintingNode):
         rows = scale.rows(self._spreading @ at_points, self._coloured)
         self._mesh_publisher.publish(self._mesh(stamp_ns, scale.palette, rows))
 
-    def _publish_legend(self) -> None:
-        bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
-        self._legend_publisher.publish(bar)
-
     def _compare(self) -> Trigger.Response:
         """The comparison in one line."""
         self.catch_up()
@@ -191,5 +184,5 @@ class ModelComparison(PaintingNode):
         }
         line = f'rms {found.rmse_um:.2f} µm at {len(found)} readings'
         if doubt := zeros_in_doubt(self.readings, found.predicted_um):
-            return Status(WARN, f'{line}; {doubt}', values)
-        return Status(OK, line, values)
+            return WARN, f'{line}; {doubt}', values
+        return OK, line, values

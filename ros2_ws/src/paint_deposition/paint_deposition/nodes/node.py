@@ -10,7 +10,6 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -37,15 +36,8 @@ WARN = DiagnosticStatus.WARN
 ERROR = DiagnosticStatus.ERROR
 
 
-@dataclass(frozen=True)
-class Status:
-    """The status of one diagnostic task; `level` is OK, WARN or ERROR (single bytes)."""
-
-    level: bytes
-    message: str
-    values: Mapping[str, object] = field(default_factory=dict)
-
-
+# Of a diagnostic task: OK, WARN or ERROR (single bytes), what is said, and figures by name.
+Status = tuple[bytes, str, Mapping[str, object]]
 Task = Callable[[], Status]
 
 
@@ -85,28 +77,25 @@ class PaintNode(Node):
             self._validate(self.values, set())
             self._start()
         except PaintError:
-            # The subclass is not constructed yet: it has nothing of its own to destroy.
+            # The subclass is not configured yet: it has nothing of its own to destroy.
             super().destroy_node()
             raise
         self.add_on_set_parameters_callback(self._on_set_parameters)
 
     def _start(self) -> None:
-        """Read the files; SIGINT and SIGTERM interrupt it."""
+        """Configure the node, and report what it does."""
+        if tasks := self._load():
+            self.report(tasks)
+
+    def _load(self) -> Mapping[str, Task]:
+        """Configure the node; SIGINT and SIGTERM interrupt it."""
         PaintNode.loading = True
-        PaintNode.end_if_loading()
         try:
-            self._load_files()
+            if PaintNode.stopping:
+                os._exit(0)
+            return self._configure()
         finally:
             PaintNode.loading = False
-
-    @classmethod
-    def end_if_loading(cls) -> None:
-        """End a process that is to stop and reads files, which takes minutes with a new model.
-
-        Nothing is lost. An exception instead could be swallowed by a library or by the compiler.
-        """
-        if PaintNode.stopping and PaintNode.loading:
-            os._exit(0)
 
     # --- for the subclass
 
@@ -116,8 +105,16 @@ class PaintNode(Node):
         ``changed`` has the names of those that change in a node whose files have been read.
         """
 
-    def _load_files(self) -> None:
-        """Read the files named in ``self.values``; a PaintError ends the node."""
+    def _configure(self) -> Mapping[str, Task]:
+        """Read the files named in ``self.values``, and create topics, services and the like.
+
+        Returns:
+            The diagnostic tasks, by name.
+
+        Raises:
+            PaintError: the files cannot be used; the node ends, or waits for others.
+        """
+        return {}
 
     def _on_change(self, names: set[str]) -> None:
         """Apply the changes of these parameters; ``self.values`` has the new values."""
@@ -192,8 +189,9 @@ class PaintNode(Node):
 
     def _files_of(self, values: Mapping[str, Any]) -> list[str]:
         """The paths that parameters hold."""
-        rows = self.PARAMETERS
-        held = [values[name] for name in values.keys() & rows.keys() if rows[name].is_path]
+        rows = self.PARAMETERS.items()
+        paths = {name for name, row in rows if row.description.endswith('[path]')}
+        held = [values[name] for name in values.keys() & paths]
         return [file for each in held for file in np.atleast_1d(each).tolist() if file]
 
     # --- diagnostics
@@ -215,16 +213,15 @@ class PaintNode(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         full_name = self.get_fully_qualified_name()
         for name, status_of in self.tasks.items():
-            status = status_of()
-            values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
+            level, words, values = status_of()
             # Aggregators tell two cells apart by the namespace.
             task = f'{full_name.lstrip("/")}: {name}'
+            figures = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
             message.status.append(
                 DiagnosticStatus(
-                    level=status.level, name=task, message=status.message,
-                    hardware_id=full_name, values=values,
+                    level=level, name=task, message=words, hardware_id=full_name, values=figures
                 )
-            )  # fmt: skip
+            )
         self._reports.publish(message)
 
     # --- changes of parameters
@@ -284,10 +281,14 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
     def on_signal(number: int, _frame: object) -> None:
         received.append(number)
         PaintNode.stopping = True
-        PaintNode.end_if_loading()
+        # Files are read for minutes with a new model, and nothing is lost. An exception instead
+        # could be swallowed by a library or by the compiler.
+        if PaintNode.loading:
+            os._exit(0)
 
     try:
-        _handle_signals(on_signal)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, on_signal)
         if received:
             return 0
         node = _create_node(make_node)
@@ -308,7 +309,8 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
     finally:
         # Python restores the default action of its own handlers while it exits, and a second
         # SIGINT would then kill it; an ignored signal stays ignored.
-        _handle_signals(signal.SIG_IGN)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
     try:
         if node is not None:
             node.close()
@@ -320,27 +322,18 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
     return exit_code
 
 
-def _handle_signals(action: Callable[[int, object], None] | signal.Handlers) -> None:
-    signal.signal(signal.SIGINT, action)
-    signal.signal(signal.SIGTERM, action)
-
-
 def _create_node(make_node: Callable[[], PaintNode]) -> PaintNode:
+    step = 'ROS arguments'
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:
-        raise PaintError(f'ROS arguments: {_reason(error)}') from None
-    try:
+        step = 'ROS cannot make the node'
         return make_node()
     except RuntimeError as error:
         # RCLError is not public. Causes: security without keys or libraries, an invalid name.
-        if type(error).__name__ != 'RCLError':
+        if step != 'ROS arguments' and type(error).__name__ != 'RCLError':
             raise
-        raise PaintError(f'ROS cannot make the node: {_reason(error)}') from None
-
-
-def _reason(error: RuntimeError) -> str:
-    return ' '.join(str(error).split(', at /')[0].split())
+        reason = ' '.join(str(error).split(', at /')[0].split())
+        raise PaintError(f'{step}: {reason}') from None
 
 
 def _report_error(error: Exception) -> int:

@@ -22,7 +22,6 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
 from paint_deposition.files.recordings.messages import nanoseconds
-from paint_deposition.motion.pose_stream import TriggerChange
 
 # On which every subscriber of the poses reports its progress.
 PROGRESS_TOPIC = 'atomizer/progress'
@@ -47,6 +46,7 @@ STAMP_OFFSET = 4
 # (stamp [ns], palette (P, 4) uint8 RGBA, (V,) row of the palette for each vertex) -> a serialised
 # Marker, ready to be published.
 MeshMessage = Callable[[int, np.ndarray, np.ndarray], bytes]
+# In order the strictest, which is reliable and latched, comes first.
 Quality = tuple[ReliabilityPolicy, DurabilityPolicy]
 USUAL = ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE
 
@@ -59,13 +59,6 @@ def gun_topic(name: str, topic: str) -> str:
 def node_name(info: TopicEndpointInfo) -> str:
     """The fully qualified name of the node of an endpoint."""
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-
-
-class PolledCallbackGroup(MutuallyExclusiveCallbackGroup):
-    """A callback group that never runs: its subscriptions are polled and do not wake the node."""
-
-    def can_execute(self, _entity: Any) -> bool:
-        return False
 
 
 class AdaptiveSubscription:
@@ -101,7 +94,7 @@ class AdaptiveSubscription:
     ) -> None:
         self._node, self._message, self._topic, self._take = node, message, topic, take
         self._depth, self._latched, self._raw, self._polled = depth, latched, raw, polled
-        self._group = PolledCallbackGroup() if polled else None
+        self._group = MutuallyExclusiveCallbackGroup() if polled else None
         self.lost = 0
         # Of each publisher its newest number; the one heard last is last.
         self._newest: dict[bytes, int] = {}
@@ -118,7 +111,7 @@ class AdaptiveSubscription:
         """Take all messages in the queues."""
         if self._polled and time.monotonic() - self._matched_s > 0.1:
             self.match_qos()
-        for quality in sorted(self._subscriptions, key=_strictest_first):
+        for quality in sorted(self._subscriptions):
             self._drain(quality)
 
     def match_qos(self) -> None:
@@ -134,14 +127,17 @@ class AdaptiveSubscription:
             for info in publishers
         }
         wanted = {*self._offered.values()} or {*self._subscriptions} or {USUAL}
-        for quality in sorted(wanted - self._subscriptions.keys(), key=_strictest_first):
+        for quality in sorted(wanted - self._subscriptions.keys()):
             self._made_s[quality] = self._matched_s
             reliability, durability = quality
-            self._subscriptions[quality] = self._node.create_subscription(
+            subscription = self._subscriptions[quality] = self._node.create_subscription(
                 self._message, self._topic, partial(self._on_message, quality),
                 QoSProfile(depth=self._depth, reliability=reliability, durability=durability),
                 callback_group=self._group, raw=self._raw,
             )  # fmt: skip
+            if self._group is not None:
+                # In a group that is busy for ever, what is polled does not wake the node.
+                self._group.beginning_execution(subscription)
         self._wanted_s |= dict.fromkeys(wanted, self._matched_s)
         for quality in [*self._subscriptions]:
             if self._matched_s - self._wanted_s[quality] > OVERLAP_S:
@@ -194,10 +190,6 @@ class AdaptiveSubscription:
         self._take(message, info)
 
 
-def _strictest_first(quality: Quality) -> tuple[bool, bool]:
-    return quality[0] != ReliabilityPolicy.RELIABLE, quality[1] == DurabilityPolicy.VOLATILE
-
-
 def header(frame_id: str, stamp_ns: int) -> Header:
     return Header(frame_id=frame_id, stamp=Time(nanoseconds=stamp_ns).to_msg())
 
@@ -210,18 +202,11 @@ def pose_message(frame_id: str, stamp_ns: int, values: Iterable[float]) -> PoseS
     return pose
 
 
-def unknown_state() -> AtomizerState:
-    """A state whose numbers are not known."""
+def state_message(**known: Any) -> AtomizerState:
+    """A state of which these fields are known; its other numbers are NaN."""
     kinds = AtomizerState.get_fields_and_field_types()
-    return AtomizerState(**{name: math.nan for name, kind in kinds.items() if kind == 'double'})
-
-
-def state_message(frame_id: str, change: TriggerChange) -> AtomizerState:
-    """A state that says no more of the gun than this."""
-    state = unknown_state()
-    state.header, state.spraying = header(frame_id, change.stamp_ns), change.flow > 0.0
-    state.flow, state.brush = change.flow, change.brush
-    return state
+    unknown = {name: math.nan for name, kind in kinds.items() if kind == 'double'}
+    return AtomizerState(**unknown | known)
 
 
 def message_class(type_name: str) -> type:

@@ -9,7 +9,6 @@ from collections import deque
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,8 +21,8 @@ from paint_deposition.files.recordings.messages import stamp_ns, transforms_of, 
 from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.transforms import PART_POSE_TOPIC, NoTransform
 from paint_deposition.nodes import topics
-from paint_deposition.nodes.frames import PartFrame, TfQueue, placed_in_order
-from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
+from paint_deposition.nodes.frames import PartFrame, TfQueue
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.parameters import (
     DISPLAY,
@@ -64,9 +63,28 @@ class WebView(PaintNode):
         )
     )
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
-        results, compared = topics.RESULTS, partial(setattr, self, '_comparison')
+    def _configure(self) -> Mapping[str, Task]:
+        values, results = self.values, topics.RESULTS
+        names = values['atomizers'] or ['']
+        self.scene = Scene()
+        self._frame = PartFrame(self, values['frame_id'])
+        self._flow: dict[str, float] = {}
+        # The simulator, which cannot paint a pose without a transform, says why.
+        self._waiting: dict[str, TfQueue] = {name: deque() for name in names}
+        # Stamp of the newest figures; their time, which goes on where a stream is restarted.
+        self._newest_ns, self._time_s = 0, 0.0
+        self._comparison = ComparisonStats(rmse_um=math.nan)
+        # What makes the film doubtful, '' if nothing does, and when the simulator said so.
+        self._doubts, self._trusted_s = '', time.monotonic()
+        self._problem = ''
+        self._sent = 0, time.monotonic()
+        self._show_part(values['mesh_file'])
+        token = os.environ.get(TOKEN, '')
+        self.page = Page(self.scene, values['host'], values['port'], token)
+        # Not to the log, which is published.
+        sys.stdout.write(f'the page is at {self.page.url}\n')
+        sys.stdout.flush()
+        compared = partial(setattr, self, '_comparison')
         for message, topic, take, profile in (
             (Part, topics.PART_TOPIC, self._take_part, topics.LATCHED),
             (TransformStamped, PART_POSE_TOPIC, self._take_part_pose, topics.LATCHED),
@@ -81,7 +99,7 @@ class WebView(PaintNode):
                 self, message, gun_topic(name, topic), partial(self._take_input, name), depth=500,
                 latched=message is AtomizerState,
             )
-            for name in self.values['atomizers'] or ['']
+            for name in names
             for message, topic in (
                 (AtomizerState, 'atomizer/state'), (PoseStamped, 'atomizer/pose'),
             )
@@ -89,30 +107,7 @@ class WebView(PaintNode):
         # At 1 kHz fifty poses wait at most.
         self.create_steady_timer(0.05, self._take_motion)
         self.create_steady_timer(0.5, self._show_trust)
-        self.report({'page': self.status})
-
-    def _load_files(self) -> None:
-        self.scene = Scene()
-        self._frame = PartFrame(self, self.values['frame_id'])
-        self._flow: dict[str, float] = {}
-        # The simulator, which cannot paint a pose without a transform, says why.
-        self._waiting: dict[str, TfQueue] = {
-            name: deque() for name in self.values['atomizers'] or ['']
-        }
-        # Stamp of the newest figures; their time, which goes on where a stream is restarted.
-        self._newest_ns, self._time_s = 0, 0.0
-        self._comparison = ComparisonStats(rmse_um=math.nan)
-        # What makes the film doubtful, '' if nothing does, and when the simulator said so.
-        self._doubts, self._trusted_s = '', time.monotonic()
-        self._problem = ''
-        self._sent = 0, time.monotonic()
-        self._show_part(self.values['mesh_file'])
-        values = self.values
-        token = os.environ.get(TOKEN, '')
-        self.page = Page(self.scene, values['host'], values['port'], token)
-        # Not to the log, which is published.
-        sys.stdout.write(f'the page is at {self.page.url}\n')
-        sys.stdout.flush()
+        return {'page': self.status}
 
     def close(self) -> None:
         self.page.close()
@@ -196,7 +191,7 @@ class WebView(PaintNode):
         for topic in (*self._frame.tf_topics, *self._inputs):
             topic.take_pending()
         for gun, waiting in self._waiting.items():
-            for pose, placed in placed_in_order(waiting, self._frame.on_part, time.monotonic()):
+            for pose, placed in self._frame.placed_in_order(waiting):
                 if isinstance(placed, NoTransform):
                     continue
                 position_m, quaternion = placed
@@ -207,7 +202,7 @@ class WebView(PaintNode):
                     self.scene.move_gun(gun, position, z_axis, self._flow.get(gun, 1.0))
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
-        for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
+        for _, parent, _, pose in transforms_of([placed]):
             self._frame.tree.place(self._frame.frame_id, parent, pose)
 
     def _take_input(self, gun: str, message: PoseStamped | AtomizerState, _info: Any) -> None:
@@ -224,5 +219,5 @@ class WebView(PaintNode):
         browsers = len(self.page.browsers)
         values = {'browsers': browsers, 'sent to all of them [kB/s]': f'{rate / 1e3:.0f}'}
         if self._problem:
-            return Status(WARN, self._problem, values)
-        return Status(OK, f'{browsers} browsers on {self.page.url.split("?")[0]}', values)
+            return WARN, self._problem, values
+        return OK, f'{browsers} browsers on {self.page.url.split("?")[0]}', values

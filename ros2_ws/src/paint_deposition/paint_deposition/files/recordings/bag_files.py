@@ -116,21 +116,18 @@ class Bag:
             )
         return topic
 
-    def type_hash(self, topic: BagTopic) -> str:
-        """RIHS01 hash of a topic's type as the bag defines it."""
-        with _read_errors(self.path):
-            return self._types(topic.name).hash_rihs01(topic.type)
-
     def decode(self, message: RawMessage) -> Any:
         """The message object of rosbags for one of this bag's messages."""
         with _read_errors(self.path):
             return self._types(message.topic).deserialize_cdr(message.cdr, message.type)
 
-    def messages(self, topics: Sequence[str] = ()) -> Iterator[RawMessage]:
-        """Messages of these topics (all, if none are named) in the order of their log time."""
+    def messages(self, topics: Sequence[str]) -> Iterator[RawMessage]:
+        """Messages of these topics in the order of their log time."""
         left = dict(self._kept)
         with _read_errors(self.path):
-            chosen = [c for c in self._reader.connections if not topics or c.topic in topics]
+            chosen = [c for c in self._reader.connections if c.topic in topics]
+            if not chosen:  # of which the readers would give all
+                return
             for connection, log_time_ns, data in self._reader.messages(connections=chosen):
                 topic, type_ = connection.topic, connection.msgtype
                 if topic in left:

@@ -17,7 +17,7 @@ from rosbags.typesys.store import Typestore
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
+from paint_deposition.files.recordings.mcap_run import RunWriter, offered_qos
 from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, Signal, stamp_ns
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses, read_tf_poses
 from paint_deposition.files.tables.headings import LENGTHS
@@ -297,7 +297,7 @@ def write_pose_bag(
 
 def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = False) -> None:
     qos = [offered_qos(1 if latched else 500, latched=latched)]
-    run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
+    run.add_topic(name, message_type, definitions.standard(message_type), qos)
 
 
 def _pose_message(types: Typestore, kind: str, place: str, values: Sequence[float]) -> Any:

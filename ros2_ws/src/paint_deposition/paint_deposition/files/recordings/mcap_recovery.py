@@ -3,9 +3,9 @@
 import math
 import shutil
 import struct
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from io import BytesIO
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
@@ -26,7 +26,7 @@ from rosbags.rosbag2.metadata import parse_qos
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.atomic import require_file, require_small
 from paint_deposition.files.recordings.bag_files import MOST_CHUNK_BYTES, expanded, mcap_files
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.mcap_run import RunWriter
 from paint_deposition.files.recordings.messages import Definition
 
 # Exceptions of the readers on damaged data.
@@ -36,28 +36,26 @@ DAMAGE = (
 )  # fmt: skip
 
 
-@dataclass
-class Recovery:
-    """The result of a recovery."""
+class Recovery(RunWriter):
+    """A new run, of what could be read of another.
 
-    folder: Path  # the new run
-    counts: dict[str, int] = field(default_factory=dict)  # messages by topic
-    damaged_chunks: int = 0  # number of chunks left out because their content is damaged
-    # Where and why reading stopped, one line for each incomplete file.
-    breaks: list[str] = field(default_factory=list)
-    # Topics that a rosbag2 folder cannot hold (not CDR, or without a schema).
-    skipped_topics: list[str] = field(default_factory=list)
+    Attributes:
+        damaged_chunks: number of chunks left out because their content is damaged.
+        breaks: where and why reading stopped, one line for each incomplete file.
+        skipped_topics: those that a rosbag2 folder cannot hold (not CDR, or without a schema).
+    """
 
-    @property
-    def message_count(self) -> int:
-        return sum(self.counts.values())
+    def __init__(self, folder: Path | str) -> None:
+        super().__init__(folder)
+        self.damaged_chunks = 0
+        self.breaks: list[str] = []
+        self.skipped_topics: list[str] = []
 
 
 def recover(
     path: Path | str,
     folder: Path | str,
     on_bytes: Callable[[int], None] = lambda count: None,
-    topics: Collection[str] = (),
 ) -> Recovery:
     """Copy every readable message of an .mcap file or a run's folder into the new run `folder`.
 
@@ -65,7 +63,6 @@ def recover(
 
     Args:
         on_bytes: called with the number of bytes read, for a progress bar.
-        topics: to copy; all, if none are named.
 
     Raises:
         RecordingError: `path` holds no MCAP file, `folder` exists or cannot be written, or no
@@ -78,26 +75,21 @@ def recover(
     files = mcap_files(path)
     if not files:
         raise RecordingError(f'{path} holds no .mcap file; only MCAP runs can be recovered')
-    writer = RunWriter(folder)
-    recovery = Recovery(writer.folder)
+    recovery = Recovery(folder)
     try:
-        with writer:
+        with recovery:
             for file in files:
-                _copy(file, writer, recovery, on_bytes, topics)
-            if not writer.message_count:
+                _copy(file, recovery, on_bytes)
+            if not recovery.message_count:
                 reason = '; '.join(recovery.breaks) or 'no messages'
                 raise RecordingError(f'nothing to recover in {path}: {reason}')
     except BaseException:
-        shutil.rmtree(writer.folder, ignore_errors=True)
+        shutil.rmtree(recovery.folder, ignore_errors=True)
         raise
-    recovery.counts = dict(writer.counts)
     return recovery
 
 
-def _copy(
-    file: Path, writer: RunWriter, recovery: Recovery, on_bytes: Callable[[int], None],
-    topics: Collection[str],
-) -> None:  # fmt: skip
+def _copy(file: Path, recovery: Recovery, on_bytes: Callable[[int], None]) -> None:
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     # The summary, if any, repeats all channels, in case the chunk that defines one is damaged.
@@ -115,16 +107,17 @@ def _copy(
                 require_small(text)
                 content = yaml.safe_load(text)
                 custom = content.get('custom_data') or {}
-                writer.custom_data = {key: str(value) for key, value in custom.items()}
-                writer.ros_distro = content.get('ros_distro') or writer.ros_distro
+                recovery.custom_data = {key: str(value) for key, value in custom.items()}
+                recovery.ros_distro = content.get('ros_distro') or recovery.ros_distro
         elif isinstance(record, Channel):
             channels[record.id] = record
         if isinstance(record, Channel | Message):
             channel = record if isinstance(record, Channel) else channels.get(record.channel_id)
-            if channel is not None and (not topics or channel.topic in topics):
-                kept = _ensure_topic(channel, schemas.get(channel.schema_id), writer, recovery)
+            if channel is not None:
+                kept = _ensure_topic(channel, schemas.get(channel.schema_id), recovery)
                 if kept and isinstance(record, Message):
-                    writer.write(channel.topic, record.data, record.log_time, record.publish_time)
+                    times_ns = record.log_time, record.publish_time
+                    recovery.write(channel.topic, record.data, *times_ns)
 
 
 def _records(
@@ -191,11 +184,9 @@ def _truncated_chunk_records(record: bytes) -> Iterator[McapRecord]:
         return
 
 
-def _ensure_topic(
-    channel: Channel, schema: Schema | None, writer: RunWriter, recovery: Recovery
-) -> bool:
-    """Add a channel's topic to the writer; False if a rosbag2 folder cannot hold it."""
-    if channel.topic in writer.counts:
+def _ensure_topic(channel: Channel, schema: Schema | None, recovery: Recovery) -> bool:
+    """Add a channel's topic to the run; False if a rosbag2 folder cannot hold it."""
+    if channel.topic in recovery.counts:
         return True
     if schema is None or channel.message_encoding != 'cdr':
         if channel.topic not in recovery.skipped_topics:
@@ -207,5 +198,5 @@ def _ensure_topic(
     except (ReaderError, KeyError, TypeError, AttributeError):
         qos = []  # damaged; players take their default then
     definition = Definition(text, channel.metadata.get('topic_type_hash', ''), schema.encoding)
-    writer.add_topic(RunTopic(channel.topic, schema.name, definition, qos))
+    recovery.add_topic(channel.topic, schema.name, definition, qos)
     return True

@@ -8,10 +8,10 @@ import json
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, contextmanager
 from io import BufferedWriter, FileIO
 from pathlib import Path
+from typing import Any
 
 import yaml
 from mcap.writer import CompressionType, IndexType, Writer
@@ -27,26 +27,15 @@ from paint_deposition.files.recordings.messages import Definition
 COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}
 
 
-def offered_qos(depth: int, reliable: bool = True, latched: bool = False) -> Qos:
-    """The QoS of a topic as rosbag2 stores it; a latched one is transient local."""
+def offered_qos(depth: int, latched: bool = False) -> Qos:
+    """The QoS of a reliable topic as rosbag2 stores it; a latched one is transient local."""
     history, liveliness = ros.QosHistory.KEEP_LAST, ros.QosLiveliness.AUTOMATIC
-    sent = ros.QosReliability.RELIABLE if reliable else ros.QosReliability.BEST_EFFORT
     kept = ros.QosDurability.TRANSIENT_LOCAL if latched else ros.QosDurability.VOLATILE
-    forever = ros.QosTime(9223372036, 854775807)
+    sent, forever = ros.QosReliability.RELIABLE, ros.QosTime(9223372036, 854775807)
     return Qos(history, depth, sent, kept, forever, forever, liveliness, forever, False)
 
 
-@dataclass(frozen=True)
-class RunTopic:
-    """The metadata of a topic; `qos` are the profiles that its publishers offered."""
-
-    name: str
-    type: str
-    definition: Definition
-    qos: Sequence[Qos] = ()
-
-
-class RunWriter:
+class RunWriter(AbstractContextManager):
     """Writes serialised messages into a new run folder.
 
     A live recorder calls `close_old_chunk` a few times a second, so that a killed process loses
@@ -59,6 +48,10 @@ class RunWriter:
         custom_data: text by name, kept in `metadata.yaml` and in the file (mesh hash, model).
         compression: a key of COMPRESSIONS.
         ros_distro: default is the environment's ROS_DISTRO.
+
+    Attributes:
+        counts: messages by topic.
+        kept: how many of them, the first, are of the part of this run, where not all are.
     """
 
     def __init__(
@@ -73,9 +66,10 @@ class RunWriter:
         self.custom_data = {key: str(value) for key, value in (custom_data or {}).items()}
         self.ros_distro = ros_distro or os.environ.get('ROS_DISTRO', 'unknown')
         self.counts: dict[str, int] = {}
-        self._kept: dict[str, int] = {}
+        self.kept: dict[str, int] = {}
         self.complete = False
-        self._topics: dict[str, RunTopic] = {}
+        # Of each topic, as rosbag2 has it.
+        self._about: dict[str, dict[str, Any]] = {}
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._first_ns = 2**63 - 1
@@ -109,25 +103,28 @@ class RunWriter:
     def message_count(self) -> int:
         return sum(self.counts.values())
 
-    def add_topic(self, topic: RunTopic) -> None:
-        """Add a topic, which is listed in the metadata even without messages."""
-        if topic.name in self._topics:
-            raise RecordingError(f'{topic.name} is already recorded in {self.folder}')
+    def add_topic(
+        self, name: str, message_type: str, definition: Definition, offered: Sequence[Qos] = ()
+    ) -> None:
+        """Add a topic, which is listed in the metadata even without messages.
+
+        ``offered`` are the profiles of its publishers.
+        """
+        qos, type_hash = dump_qos_v9(list(offered)), definition.type_hash
         with self._write_errors():
-            if topic.type not in self._schemas:
-                definition = topic.definition
-                self._schemas[topic.type] = self._writer.register_schema(
-                    topic.type, definition.encoding, definition.text.encode()
+            if message_type not in self._schemas:
+                self._schemas[message_type] = self._writer.register_schema(
+                    message_type, definition.encoding, definition.text.encode()
                 )
-            qos = _yaml(dump_qos_v9(list(topic.qos))).strip()
-            about = {
-                'offered_qos_profiles': qos, 'topic_type_hash': topic.definition.type_hash
-            }  # fmt: skip
-            self._channels[topic.name] = self._writer.register_channel(
-                topic.name, 'cdr', self._schemas[topic.type], about
+            about = {'offered_qos_profiles': _yaml(qos).strip(), 'topic_type_hash': type_hash}
+            self._channels[name] = self._writer.register_channel(
+                name, 'cdr', self._schemas[message_type], about
             )
-        self._topics[topic.name] = topic
-        self.counts[topic.name] = 0
+        self._about[name] = {
+            'name': name, 'type': message_type, 'serialization_format': 'cdr',
+            'offered_qos_profiles': qos, 'type_description_hash': type_hash,
+        }  # fmt: skip
+        self.counts[name] = 0
 
     def write(self, topic: str, cdr: bytes, log_time_ns: int, publish_time_ns: int) -> None:
         """Append a message, with the times at which it was received and sent."""
@@ -150,20 +147,8 @@ class RunWriter:
                 self._writer.flush()
             self._chunk_opened_s = None
 
-    def keep(self, counts: Mapping[str, int]) -> None:
-        """Readers are to take so many messages of these topics, the first; the rest is not its."""
-        self._kept |= counts
-        if self._kept:
-            self.custom_data[KEPT] = ' '.join(f'{name}={n}' for name, n in self._kept.items())
-
-    def keep_another(self, topic: str) -> None:
-        """One more message of a topic is kept, if not all are."""
-        self.keep({topic: self._kept[topic] + 1} if topic in self._kept else {})
-
-    def finish(self) -> Path:
-        """Complete the run and return its folder."""
-        if self.complete:
-            return self.folder
+    def finish(self) -> None:
+        """Complete the run."""
         with self._write_errors():
             self._writer.flush()
             self._writer.add_metadata('rosbag2', {'serialized_metadata': _yaml(self._metadata())})
@@ -174,14 +159,10 @@ class RunWriter:
             information = {'rosbag2_bagfile_information': self._metadata()}
             write_text(self.folder / 'metadata.yaml', _yaml(information))
         self.complete = True
-        return self.folder
 
     def abandon(self) -> None:
         """Close the file as it is; the run stays unfinished."""
         self._raw.close()
-
-    def __enter__(self) -> 'RunWriter':
-        return self
 
     def __exit__(self, exception_type: type[BaseException] | None, *_: object) -> None:
         if exception_type is None:
@@ -213,22 +194,17 @@ class RunWriter:
             'message_count': self.message_count,
         }
         topics = [
-            {
-                'topic_metadata': {
-                    'name': name, 'type': topic.type, 'serialization_format': 'cdr',
-                    'offered_qos_profiles': dump_qos_v9(list(topic.qos)),
-                    'type_description_hash': topic.definition.type_hash,
-                },
-                'message_count': self.counts[name],
-            }
-            for name, topic in self._topics.items()
-        ]  # fmt: skip
+            {'topic_metadata': about, 'message_count': self.counts[name]}
+            for name, about in self._about.items()
+        ]
+        kept = ' '.join(f'{name}={count}' for name, count in self.kept.items())
         return {
             'version': 9, 'storage_identifier': 'mcap', **times,
             'topics_with_message_count': topics, 'compression_format': '', 'compression_mode': '',
             'relative_file_paths': [self.path.name],
             'files': [{'path': self.path.name, **times}],
-            'custom_data': self.custom_data, 'ros_distro': self.ros_distro,
+            'custom_data': self.custom_data | ({KEPT: kept} if kept else {}),
+            'ros_distro': self.ros_distro,
         }  # fmt: skip
 
 

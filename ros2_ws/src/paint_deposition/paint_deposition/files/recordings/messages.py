@@ -163,12 +163,14 @@ def pose_of(message: Any) -> tuple[np.ndarray, np.ndarray]:
     return values[:3], values[3:]
 
 
-def transforms_of(message: Any) -> Iterator[tuple[str, str, int, tuple[float, ...]]]:
-    """Child, parent, stamp [ns] and pose x y z qx qy qz qw of each transform of a TFMessage.
+def transforms_of(
+    transforms: Iterable[Any],
+) -> Iterator[tuple[str, str, int, tuple[float, ...]]]:
+    """Child, parent, stamp [ns] and pose x y z qx qy qz qw of each TransformStamped.
 
     One that is not finite, or whose quaternion is none, is passed over, as by tf2.
     """
-    for placed in message.transforms:
+    for placed in transforms:
         t, q = placed.transform.translation, placed.transform.rotation
         pose = t.x, t.y, t.z, q.x, q.y, q.z, q.w
         parent, child = placed.header.frame_id.lstrip('/'), placed.child_frame_id.lstrip('/')

@@ -4,7 +4,6 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -33,19 +32,9 @@ STATIC = 'tf_static'
 PART_POSE_TYPE = 'geometry_msgs/msg/TransformStamped'
 
 
-@dataclass(frozen=True, eq=False)
-class Edge:
-    """Poses of a frame in its parent: (N,) stamps, (N,) log times, (N, 7) x y z qx qy qz qw.
-
-    ``fault`` says where a stream over time starts again, '' where it does not.
-    """
-
-    parent: str
-    child: str
-    stamps_ns: np.ndarray
-    log_times_ns: np.ndarray
-    poses: np.ndarray
-    fault: str = ''
+# By child and parent the poses of a frame in another, each stamp once and in order, and when they
+# were logged (N,) [ns]. A stream over time that starts again says so in its warnings.
+Edges = dict[tuple[str, str], tuple[Trajectory, np.ndarray]]
 
 
 def starts_again(stamps_ns: np.ndarray, log_times_ns: np.ndarray) -> str:
@@ -66,7 +55,7 @@ def part_pose_topics(bag: Bag) -> list[str]:
     return [name for name in topics if name.rsplit('/', 1)[-1] == PART_POSE_TOPIC]
 
 
-def _edges(bag: Bag, static: bool) -> list[Edge]:
+def _edges(bag: Bag, static: bool) -> Edges:
     """The transforms of a bag, either the static ones or those over time."""
     topics = [topic.name for topic in bag.topics_of(*TF_TYPES)]
     topics = [name for name in topics if (name.rsplit('/', 1)[-1] == STATIC) == static]
@@ -74,11 +63,11 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
     rows: dict[tuple[str, str], list[tuple]] = defaultdict(list)
     parts: dict[tuple[str, str], list[tuple]] = defaultdict(list)
     for names, found in ((topics, rows), (placed, parts)):
-        for _, log_time_ns, message in bag.decoded(names) if names else ():
-            several = message if found is rows else SimpleNamespace(transforms=[message])
+        for _, log_time_ns, message in bag.decoded(names):
+            several = message.transforms if found is rows else [message]
             for child, parent, stamp, pose in transforms_of(several):
-                found[parent, child].append((stamp, log_time_ns, pose))
-    for (parent, child), poses in parts.items():
+                found[child, parent].append((stamp, log_time_ns, pose))
+    for (child, parent), poses in parts.items():
         if len({pose for *_, pose in poses}) > 1:
             raise RecordingError(
                 f"{bag.path}: '{child}' was moved in '{parent}' while the run was recorded; "
@@ -86,25 +75,29 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
             )
     # The last static transform replaces earlier ones, as in tf2.
     last = slice(-1, None) if static else slice(None)
-    edges = []
-    for (parent, child), its in (parts | rows).items():
+    edges: Edges = {}
+    for (child, parent), its in (parts | rows).items():
         stamps, log_times, values = map(np.array, zip(*its[last], strict=True))
-        _, first = np.unique(stamps, return_index=True)  # in order, each stamp once
-        values = values[first].astype(float)
+        _, first = np.unique(stamps, return_index=True)
+        places, turns = np.split(values[first].astype(float), [3], axis=1)
         fault = '' if static else starts_again(stamps, log_times)
-        edges.append(Edge(parent, child, stamps[first], log_times[first], values, fault))
+        faults = (fault,) if fault else ()
+        told = Trajectory(stamps[first], places, turns, parent, warnings=faults)
+        edges[child, parent] = told, log_times[first]
     return edges
 
 
 def read_frames(bag: Bag) -> FrameTree:
     """The frames of /tf_static, part_pose and /tf; a static one without direction is none."""
     tree = FrameTree()
-    for edge in _edges(bag, static=False):
-        for stamp, pose in zip(edge.stamps_ns.tolist(), edge.poses, strict=True):
-            tree.add(edge.child, edge.parent, stamp, pose)
-    for edge in _edges(bag, static=True):
-        if np.isfinite(edge.poses[-1]).all() and np.any(edge.poses[-1][3:]):
-            tree.fix(edge.child, edge.parent, edge.poses[-1])
+    for static in (False, True):
+        for (child, parent), (poses, _) in _edges(bag, static).items():
+            values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
+            for stamp, pose in zip(poses.stamps_ns.tolist(), values, strict=True):
+                if not static:
+                    tree.add(child, parent, stamp, pose)
+                elif np.isfinite(pose).all() and np.any(pose[3:]):
+                    tree.fix(child, parent, pose)
     return tree
 
 
@@ -136,14 +129,14 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
     between = tree.moving_between(source, target)
     if between is None:
         raise RecordingError(f"{bag.path}: no transforms lead from '{source}' to '{target}'")
-    edges = [edge for edge in _edges(bag, static=False) if edge.child in between]
-    for edge in edges:
-        if edge.fault:
-            raise RecordingError(f'{bag.path}: {edge.parent} to {edge.child}: {edge.fault}')
-    moving = [edge for edge in edges if len(edge.stamps_ns) > 1]
+    edges = {key: edge for key, edge in _edges(bag, static=False).items() if key[0] in between}
+    for (child, parent), (poses, _) in edges.items():
+        for fault in poses.warnings:
+            raise RecordingError(f'{bag.path}: {parent} to {child}: {fault}')
+    moving = [edge for edge in edges.values() if len(edge[0]) > 1]
     if not moving:
         raise RecordingError(f"{bag.path}: '{source}' does not move in '{target}'")
-    clock = max(moving, key=lambda edge: len(edge.stamps_ns))
+    clock, log_times_ns = max(moving, key=lambda edge: len(edge[0]))
     covered, found = lookups(tree, source, target, clock.stamps_ns)
     if len(found) < 2:
         raise RecordingError(
@@ -151,14 +144,11 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
         )
     note = f"tf: pose of '{source}' in '{target}', {len(found)} poses"
     if more := len(moving) - 1:
-        gaps_ns = [np.diff(np.unique(edge.stamps_ns)).max(initial=0) for edge in moving]
-        longest_s = 1e-9 * max(gaps_ns)
+        longest_s = 1e-9 * max(np.diff(poses.stamps_ns).max() for poses, _ in moving)
         note += f', {more} more transforms interpolated over up to {longest_s:.3g} s'
-    poses = np.array([pose.values for pose in found])
-    trajectory = Trajectory(
-        clock.stamps_ns[covered], poses[:, :3], poses[:, 3:], target, notes=(note,)
-    )
-    return trajectory, clock.log_times_ns[covered]
+    places, turns = np.split(np.array([pose.values for pose in found]), [3], axis=1)
+    trajectory = Trajectory(clock.stamps_ns[covered], places, turns, target, notes=(note,))
+    return trajectory, log_times_ns[covered]
 
 
 POSE_TYPE = 'geometry_msgs/msg/PoseStamped'
@@ -275,10 +265,8 @@ def sources_of_poses(bag: Bag, max_gap_s: float) -> Iterator[PoseSource]:
         except RecordingError as error:
             yield PoseSource(topic.name, topic.type, faults=(str(error),))
             continue
-        values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
-        quality = StreamQuality.of(poses.stamps_ns, values, logged, max_gap_s)
         options = f'--pose-topic {topic.name}'
-        yield _of_poses(topic.name, topic.type, poses.frame_id, values, quality, options)
+        yield _source(topic.name, topic.type, poses, logged, options, max_gap_s)
     for topic in bag.topics_of(JOINT_TYPE):
         streams, _ = joint_streams(bag.decoded([topic.name]))
         rows = max(streams.values(), key=len, default=[])
@@ -294,20 +282,22 @@ def sources_of_poses(bag: Bag, max_gap_s: float) -> Iterator[PoseSource]:
             options += ' --angle-unit deg' if degrees else ''
             unit, faults = 'deg' if degrees else 'rad', tuple(quality.faults(topic.name))
             yield PoseSource(topic.name, topic.type, '', unit, quality, options, faults)
-    for edge in _edges(bag, static=False):
-        if len(edge.stamps_ns) < 2:
+    for (child, parent), (poses, logged) in _edges(bag, static=False).items():
+        if len(poses) < 2:
             continue
-        name, options = f'{edge.parent} to {edge.child}', f'--tf {edge.parent} {edge.child}'
-        if edge.fault:
-            yield PoseSource(name, 'transforms', edge.parent, faults=(edge.fault,))
+        name, options = f'{parent} to {child}', f'--tf {parent} {child}'
+        if poses.warnings:
+            yield PoseSource(name, 'transforms', parent, faults=poses.warnings)
             continue
-        quality = StreamQuality.of(edge.stamps_ns, edge.poses, edge.log_times_ns, max_gap_s)
-        yield _of_poses(name, 'transforms', edge.parent, edge.poses, quality, options)
+        yield _source(name, 'transforms', poses, logged, options, max_gap_s)
 
 
-def _of_poses(
-    name: str, kind: str, frame_id: str, poses: np.ndarray, quality: StreamQuality, options: str
+def _source(
+    name: str, kind: str, poses: Trajectory, logged: np.ndarray, options: str, max_gap_s: float
 ) -> PoseSource:
-    unit = 'mm' if looks_like_mm(poses[:, :3]) else 'm'
+    values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
+    quality = StreamQuality.of(poses.stamps_ns, values, logged, max_gap_s)
+    unit = 'mm' if looks_like_mm(poses.positions_m) else 'm'
     options += ' --pose-unit mm' if unit == 'mm' else ''
-    return PoseSource(name, kind, frame_id, unit, quality, options, tuple(quality.faults(name)))
+    faults = tuple(quality.faults(name))
+    return PoseSource(name, kind, poses.frame_id, unit, quality, options, faults)

@@ -3,12 +3,11 @@
 import math
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from heapq import merge
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TransformStamped
@@ -22,7 +21,6 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage, open_bag
 from paint_deposition.files.recordings.bags import (
     BOOL_TYPE,
@@ -31,7 +29,7 @@ from paint_deposition.files.recordings.bags import (
     trajectory_of,
 )
 from paint_deposition.files.recordings.joint_states import Robot
-from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, stamp_ns
+from paint_deposition.files.recordings.messages import TF_TYPES, stamp_ns
 from paint_deposition.files.recordings.pose_topics import (
     PART_POSE_TYPE,
     POSE_TYPE,
@@ -40,12 +38,12 @@ from paint_deposition.files.recordings.pose_topics import (
     part_pose_topics,
     read_frames,
 )
-from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
+from paint_deposition.motion.trajectory import relative_flow
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
-from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
+from paint_deposition.nodes.node import OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
-from paint_deposition.nodes.topics import header, header_stamp_ns, pose_message, unknown_state
+from paint_deposition.nodes.topics import header, header_stamp_ns, pose_message, state_message
 from paint_deposition.request import MotionOptions
 
 
@@ -98,33 +96,7 @@ class BagPlayer(PaintNode):
         publish_clock=NodeParameter(True, 'Publish /clock [true/false]'),
     )
 
-    def __init__(self, **kwargs: Any):
-        super().__init__(**kwargs)
-        # Reliable, so that subscribers acknowledge.
-        profile = QoSProfile(depth=max(topics.POSE_DEPTH, self.values['window']))
-        self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
-        self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
-        self._clock_publisher: Publisher | None = None
-        self._clock_order = threading.Lock()
-        self._time = ReplayClock(self.values['rate'], running=not self.values['start_paused'])
-        if self.values['publish_clock']:
-            self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
-            self.create_steady_timer(0.01, self._publish_clock)
-        self.create_service(Trigger, '~/pause', lambda *_: self._set_running(False))
-        self.create_service(Trigger, '~/resume', lambda *_: self._set_running(True))
-        self._subscribers_to_await = self.values['wait_for_subscribers']
-        window = self.values['window']
-        self._flow_control = FlowControl(self, self._pose_publisher, window, self.stopped)
-        self.poses_published = self.states_published = 0
-        self.report({'replay': self.status})
-        self.start_thread(self._replay)
-
-    def close(self) -> None:
-        super().close()
-        replayed = f'replayed {self.poses_published} poses, {self.states_published} states'
-        self.get_logger().info(replayed)
-
-    def _load_files(self) -> None:
+    def _configure(self) -> Mapping[str, Task]:
         values = self.values
         if not values['bag']:
             raise PaintError('bag_player: bag is empty: give the path of a recording')
@@ -146,20 +118,40 @@ class BagPlayer(PaintNode):
             else:
                 self._motion = motion_of(bag, *motion)
             self._state_topic: BagTopic | None = None
-            self._states_are_current = False
             unused = [topic.name for topic in bag.topics_of(*STATE_TYPES)]
             if values['state_topic']:
                 self._state_topic = bag.choose(values['state_topic'], STATE_TYPES, 'state')
                 if self._state_topic.type == BOOL_TYPE:
                     # Raises an error unless recorder and robot had the same clock.
                     trajectory_of(bag, motion[0], values['state_topic'], *motion[1:])
-                else:
-                    today = definitions.installed(STATE_TYPE).type_hash
-                    self._states_are_current = bag.type_hash(self._state_topic) == today
             elif unused:
                 self.get_logger().info(
                     f'no state_topic: the gun always sprays; the bag has {" ".join(unused)}'
                 )
+        # Reliable, so that subscribers acknowledge.
+        profile = QoSProfile(depth=max(topics.POSE_DEPTH, values['window']))
+        self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
+        self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
+        self._clock_publisher: Publisher | None = None
+        self._clock_order = threading.Lock()
+        self._time = ReplayClock(values['rate'], running=not values['start_paused'])
+        if values['publish_clock']:
+            self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
+            self.create_steady_timer(0.01, self._publish_clock)
+        self.create_service(Trigger, '~/pause', lambda *_: self._set_running(False))
+        self.create_service(Trigger, '~/resume', lambda *_: self._set_running(True))
+        self._subscribers_to_await = values['wait_for_subscribers']
+        self._flow_control = FlowControl(
+            self, self._pose_publisher, values['window'], self.stopped
+        )
+        self.poses_published = self.states_published = 0
+        self.start_thread(self._replay)
+        return {'replay': self.status}
+
+    def close(self) -> None:
+        super().close()
+        replayed = f'replayed {self.poses_published} poses, {self.states_published} states'
+        self.get_logger().info(replayed)
 
     def _create_transform_publishers(self, bag: Bag) -> None:
         """Without tf2_msgs none, and a warning that names the parameters to set instead."""
@@ -202,7 +194,7 @@ class BagPlayer(PaintNode):
     def status(self) -> Status:
         if self._clock_publisher and self.count_publishers('/clock') > 1:
             jumps = 'another node publishes /clock, too: time jumps for nodes with use_sim_time'
-            return Status(WARN, f'{jumps}; set publish_clock to false for one of them')
+            return WARN, f'{jumps}; set publish_clock to false for one of them', {}
         status = self._flow_control.status if self._time.running else 'paused'
         ahead = self._flow_control.lag(time.monotonic())
         values = {
@@ -211,38 +203,35 @@ class BagPlayer(PaintNode):
             'states published': self.states_published,
             'poses ahead of the slowest subscriber': max(ahead.values(), default=0),
         }
-        return Status(WARN if status.startswith('waiting') else OK, status, values)
+        return WARN if status.startswith('waiting') else OK, status, values
 
     # --- the replay's own thread
 
     def _replay(self) -> None:
         while not self.stopped.is_set():
-            self._play_once()
+            begun = False
+            with open_bag(self.values['bag']) as bag:
+                for message in self._messages(bag):
+                    if not begun:
+                        begun = True
+                        self._time.change(started=False, time_ns=message.log_time_ns)
+                        self._flow_control.wait_for_subscribers(self._subscribers_to_await)
+                        self._subscribers_to_await = 0  # when looping
+                        self._time.change(started=True)
+                    # Wait for the end of a pause, the time of the message, and the flow control.
+                    self._time.wait_for(message.log_time_ns, self.stopped)
+                    if self.values['rate'] == 0.0:
+                        self._flow_control.wait_for_lag_below(self.values['window'])
+                        self._time.change(time_ns=message.log_time_ns)
+                    if self.stopped.is_set():
+                        break
+                    self._publish(message, bag)
+            self._time.change(started=False)
+            self._publish_clock()
             self._flow_control.wait_until_taken()
             if not self.values['loop']:
                 break
         self.finish()
-
-    def _play_once(self) -> None:
-        begun = False
-        with open_bag(self.values['bag']) as bag:
-            for message in self._messages(bag):
-                if not begun:
-                    begun = True
-                    self._time.change(started=False, time_ns=message.log_time_ns)
-                    self._flow_control.wait_for_subscribers(self._subscribers_to_await)
-                    self._subscribers_to_await = 0  # when looping
-                    self._time.change(started=True)
-                # Wait for the end of a pause, the time of the message, and the flow control.
-                self._time.wait_for(message.log_time_ns, self.stopped)
-                if self.values['rate'] == 0.0:
-                    self._flow_control.wait_for_lag_below(self.values['window'])
-                    self._time.change(time_ns=message.log_time_ns)
-                if self.stopped.is_set():
-                    return
-                self._publish(message, bag)
-        self._time.change(started=False)
-        self._publish_clock()
 
     def _messages(self, bag: Bag) -> Iterator[RawMessage]:
         """Poses, states and transforms by log time; at equal times, poses last."""
@@ -260,7 +249,7 @@ class BagPlayer(PaintNode):
                 for stamp, at_ns, place in zip(stamps_ns, logged_ns, places, strict=True)
             )
         log_time = attrgetter('log_time_ns')
-        messages = merge(bag.messages(read) if read else (), poses, key=log_time)
+        messages = merge(bag.messages(read), poses, key=log_time)
         for _, simultaneous in groupby(messages, key=log_time):
             yield from sorted(simultaneous, key=lambda each: each.topic == self._pose_topic)
 
@@ -276,28 +265,20 @@ class BagPlayer(PaintNode):
         elif message.topic in self._transform_topics:
             self._transform_publishers[message.topic.endswith(STATIC)].publish(message.cdr)
         else:
-            self._state_publisher.publish(self._state_of(message, bag))
+            if message.type == BOOL_TYPE:
+                spraying = deserialize_message(message.cdr, Bool).data
+                at, flow = header('', message.log_time_ns), relative_flow(spraying)
+                state = state_message(header=at, spraying=spraying, flow=flow)
+            else:  # of any version: fields of the same name are copied
+                recorded = bag.decode(message)
+                at = header(recorded.header.frame_id, stamp_ns(recorded.header))
+                state = state_message(header=at)
+                for name in state.get_fields_and_field_types():
+                    if name != 'header' and hasattr(recorded, name):
+                        kind = type(getattr(state, name))
+                        setattr(state, name, kind(getattr(recorded, name)))
+            self._state_publisher.publish(state)
             self.states_published += 1
-
-    def _state_of(self, message: RawMessage, bag: Bag) -> AtomizerState | bytes:
-        """A recorded Bool or state as the message of today, or its bytes if it is one."""
-        if self._states_are_current:
-            return message.cdr
-        state = unknown_state()
-        if message.type == BOOL_TYPE:
-            state.header = header('', message.log_time_ns)
-            state.spraying = deserialize_message(message.cdr, Bool).data
-            state.flow = relative_flow(state.spraying)
-            return state
-        # Of another version of the message, fields of the same name are copied.
-        recorded = bag.decode(message)
-        state.header = header(recorded.header.frame_id, stamp_ns(recorded.header))
-        state.spraying = bool(recorded.spraying)
-        state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
-        for name, kind in state.get_fields_and_field_types().items():
-            if kind == 'double':
-                setattr(state, name, float(getattr(recorded, name, math.nan)))
-        return state
 
     def _publish_clock(self) -> None:
         with self._clock_order:

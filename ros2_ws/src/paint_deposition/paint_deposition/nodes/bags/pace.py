@@ -19,8 +19,6 @@ LOG_PERIOD_S = 5.0
 ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
 # If a subscriber reports the same pose for so long while none is sent, later poses are lost to it.
 LOST_TIMEOUT_S = 5.0
-# A subscriber that has not reported at all is waited for no longer than this.
-NO_REPORT_TIMEOUT_S = 20.0
 
 
 class ReplayClock:
@@ -78,14 +76,13 @@ class ReplayClock:
 class Subscriber:
     """Number of poses taken, monotonic times of the last progress and the last report.
 
-    `lost` poses never reached it; with `never_reported` it is no longer waited for.
+    `lost` poses never reached it.
     """
 
     taken: int
     advanced_s: float
-    reported_s: float | None = None
+    reported_s: float = -math.inf
     lost: int = 0
-    never_reported: bool = False
 
 
 class FlowControl:
@@ -113,13 +110,10 @@ class FlowControl:
         self._stamps: deque[int] = deque(maxlen=20_000)
         self.subscribers: dict[str, Subscriber] = {}
         self._discovered_s = -math.inf
-        self._mute: set[str] = set()
         self.status = 'starting'
         node.create_subscription(
             PoseProgress, PROGRESS_TOPIC,
-            lambda said: self.report(
-                said.reporter or None, stamp_ns(said.header), time.monotonic()
-            ),
+            lambda said: self.report(said.reporter, stamp_ns(said.header), time.monotonic()),
             PROGRESS,
         )  # fmt: skip
 
@@ -140,38 +134,32 @@ class FlowControl:
                 name: known.get(name) or Subscriber(self._sent, now_s) for name in sorted(names)
             }
 
-    def report(self, name: str | None, stamp_ns: int, now_s: float) -> None:
-        """Set the newest pose that a subscriber has taken, or all of them without a name."""
+    def report(self, name: str, stamp_ns: int, now_s: float) -> None:
+        """Set the newest pose that a subscriber has taken."""
         with self._lock:
             # Of poses with equal stamps, the newest.
             back = next((k for k, s in enumerate(reversed(self._stamps)) if s == stamp_ns), None)
             taken = 0 if back is None else self._sent - back
-            for known, subscriber in self.subscribers.items():
-                if name in (None, known):
-                    subscriber.reported_s, subscriber.never_reported = now_s, False
-                    if taken > subscriber.taken:
-                        subscriber.taken, subscriber.advanced_s = taken, now_s
+            if subscriber := self.subscribers.get(name):
+                subscriber.reported_s = now_s
+                if taken > subscriber.taken:
+                    subscriber.taken, subscriber.advanced_s = taken, now_s
 
     def lag(self, now_s: float) -> dict[str, int]:
-        """Number of poses that each subscriber still has to take, if it is waited for."""
+        """Number of poses that each subscriber still has to take, and has not lost."""
         with self._lock:
-            waited_for = {}
+            behind = {}
             for name, subscriber in self.subscribers.items():
-                if subscriber.taken == self._sent:
-                    continue
+                left = self._sent - subscriber.taken
                 quiet_since_s = max(self._sent_s, subscriber.advanced_s)
-                if subscriber.reported_s is None:
-                    subscriber.never_reported |= now_s - quiet_since_s > NO_REPORT_TIMEOUT_S
-                elif (
-                    now_s - quiet_since_s > LOST_TIMEOUT_S
-                    # Without reports in this time it may be busy.
-                    and subscriber.reported_s > quiet_since_s + 0.5 * LOST_TIMEOUT_S
-                ):
-                    subscriber.lost += self._sent - subscriber.taken
+                # Without reports in this time it may be busy.
+                reports = subscriber.reported_s > quiet_since_s + 0.5 * LOST_TIMEOUT_S
+                if reports and now_s - quiet_since_s > LOST_TIMEOUT_S:
+                    subscriber.lost += left
                     subscriber.taken = self._sent
-                if subscriber.taken < self._sent and not subscriber.never_reported:
-                    waited_for[name] = self._sent - subscriber.taken
-            return waited_for
+                elif left:
+                    behind[name] = left
+            return behind
 
     def _discover(self) -> frozenset[str]:
         """Full names of the subscribers that also publish progress."""
@@ -217,7 +205,7 @@ class FlowControl:
                 self._node.get_logger().warning(f'{name} has lost {subscriber.lost} poses')
 
     def wait_for_lag_below(self, limit: int) -> None:
-        """Wait until all subscribers that are waited for have fewer poses to take than that."""
+        """Wait until all subscribers have fewer poses to take than that."""
         if self._sent % self._window == 0:
             self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN)
         logged_s = time.monotonic()
@@ -228,13 +216,6 @@ class FlowControl:
             behind = self.lag(now_s)
             if max(behind.values(), default=0) < limit:
                 break
-            mute = {name for name, s in self.subscribers.items() if s.never_reported}
-            for name in mute - self._mute:
-                self._node.get_logger().warning(
-                    f'{name} has never reported its progress: it is no longer waited for, and '
-                    'may lose poses when its queue overflows'
-                )
-            self._mute = mute
             if now_s - logged_s > LOG_PERIOD_S:
                 logged_s = now_s
                 late = ', '.join(f'{name}, {count} poses behind' for name, count in behind.items())

@@ -1,5 +1,6 @@
 """What a recorder keeps: its parameters and topics, and the counts of each topic."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -14,8 +15,8 @@ from rosbags.interfaces import (
     QosTime,
 )
 
-from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic
-from paint_deposition.files.recordings.messages import JOINT_TYPE, STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.mcap_run import COMPRESSIONS
+from paint_deposition.files.recordings.messages import JOINT_TYPE, STATE_TYPE, TF_TYPES, Definition
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.managed_node import MANAGED
 from paint_deposition.nodes.parameters import (
@@ -98,8 +99,9 @@ class RecordedTopic(AdaptiveSubscription):
     the run began.
 
     Attributes:
-        run_topic: the topic as the run stores it; name: of the topic.
+        about: what a run stores of the topic, as for `RunWriter.add_topic`; name: of the topic.
         messages: number of messages received, in all runs.
+        before_discovery: messages of each publisher sent in this run before the first one heard.
         unnumbered: messages without a sequence number, whose losses cannot be counted.
         gaps, longest_gap_ns: intervals between header stamps above the limit.
         newest_stamp_ns: header stamp of the last message.
@@ -109,22 +111,22 @@ class RecordedTopic(AdaptiveSubscription):
     def __init__(
         self,
         node: Node,
-        run_topic: RunTopic,
+        about: tuple[str, str, Definition, Sequence[Qos]],
         take: Callable[[str, bytes, int, int], None],
         max_gap_ns: int | None,
         begun_ns: int,
         depth: int,
     ) -> None:
-        self.run_topic, self.name = run_topic, run_topic.name
+        self.about, self.name = about, about[0]
         self.messages = self._log_time_ns = self.sent_ns = 0
         # How each publisher was first heard: number of the message, when it was sent, and how
         # long after the begin of the run; and how many came before, by its rate.
         self._first: dict[bytes, tuple[int, int, int]] = {}
-        self._before_first: dict[bytes, int] = {}
+        self.before_discovery: Counter[bytes] = Counter()
         self._pass_on, self._max_gap_ns = take, max_gap_ns
         self.reset_counts(begun_ns)
         super().__init__(
-            node, message_class(run_topic.type), self.name, self._record, depth=depth,
+            node, message_class(about[1]), self.name, self._record, depth=depth,
             latched=True, raw=True, polled=False,
         )  # fmt: skip
 
@@ -134,23 +136,18 @@ class RecordedTopic(AdaptiveSubscription):
         self.lost = self.unnumbered = self.gaps = 0
         self.longest_gap_ns = self.newest_stamp_ns = 0
         self._first = {gid: (number, sent, 0) for gid, (number, sent, _) in self._first.items()}
-        self._before_first.clear()
+        self.before_discovery.clear()
 
     def unsubscribe(self) -> None:
         super().unsubscribe()
         self._first.clear()
 
     @property
-    def before_discovery(self) -> int:
-        """Messages sent while this was recording, before the first one of their publisher."""
-        return sum(self._before_first.values())
-
-    @property
     def losses(self) -> str:
         """The number of lost messages, as text."""
         if self.unnumbered:
             return 'losses cannot be counted'
-        first = self.before_discovery
+        first = self.before_discovery.total()
         before = f', {first} {MISSED_BEFORE_DISCOVERY}' if first else ''
         return f'{self.lost} missed{before}'
 
@@ -169,7 +166,7 @@ class RecordedTopic(AdaptiveSubscription):
             # The first few tell.
             if 0 < number - first <= 50:
                 period_ns = max((sent_ns - first_sent_ns) / (number - first), 1.0)
-                self._before_first[gid] = int(min(first - 1, waited_ns / period_ns))
+                self.before_discovery[gid] = int(min(first - 1, waited_ns / period_ns))
         if self._max_gap_ns is not None:
             before_ns, self.newest_stamp_ns = self.newest_stamp_ns, header_stamp_ns(cdr)
             gap_ns = self.newest_stamp_ns - before_ns

@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import messages as definitions
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.mcap_run import RunWriter
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.bags.initial_messages import TF, InitialMessages
@@ -55,6 +55,7 @@ class RunRecorder(ManagedNode):
     runs = 0
 
     def _configure(self) -> Mapping[str, Task]:
+        self._custom_data = provenance(self.values['mesh_file'], self.values['model_file'])
         guns, resolved = self.values['atomizers'] or [''], self.resolve_topic_name
         self._part_topic = resolved(PART_TOPIC)
         wanted = map(resolved, self.values['topics'] or default_topics(guns))
@@ -93,11 +94,6 @@ class RunRecorder(ManagedNode):
         self.create_steady_timer(0.2, self._report_progress)
         self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
 
-    def _load_files(self) -> None:
-        self._custom_data = provenance(self.values['mesh_file'], self.values['model_file'])
-        if self.values['name']:
-            require_file_name('name', self.values['name'])
-
     def _create_run(self, name: str, custom_data: dict[str, str], keep_name: bool) -> RunWriter:
         """A run of this name, if any; with date and time if it exists, unless it keeps its name.
 
@@ -116,7 +112,7 @@ class RunRecorder(ManagedNode):
 
     def destroy_node(self) -> None:
         for run in (self.run, self.leaving) if self.runs else ():
-            if run is not None and not run.complete:
+            if run is not None:
                 run.abandon()
         super().destroy_node()
 
@@ -141,10 +137,10 @@ class RunRecorder(ManagedNode):
                 if name in self.recorded:
                     self.recorded[name].match_qos()
                     continue
-                run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
-                self._guarded(self.run.add_topic, run_topic)
+                about = name, types[0], definitions.installed(types[0]), offered
+                self._guarded(self.run.add_topic, *about)
                 self.recorded[name] = RecordedTopic(
-                    self, run_topic, self._write, max_gap_ns, self._begun_ns,
+                    self, about, self._write, max_gap_ns, self._begun_ns,
                     depth=5000 if types[0] in MOTION_TYPES else 100,
                 )  # fmt: skip
             except RecordingError as error:
@@ -177,10 +173,11 @@ class RunRecorder(ManagedNode):
             self._too_late += 1
             return
         if name not in self.leaving.counts:
-            self.leaving.add_topic(self.recorded[name].run_topic)
+            self.leaving.add_topic(*self.recorded[name].about)
         before_ns = self._initial_messages.begin_ns - 1
         self.leaving.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
-        self.leaving.keep_another(name)
+        if name in self.leaving.kept:
+            self.leaving.kept[name] += 1
         self._leaves_s = time.monotonic() + LATE_S
 
     def _has_left(self, leaving: RunWriter) -> bool:
@@ -224,7 +221,8 @@ class RunRecorder(ManagedNode):
             self._end_of_leaving()
             # Some messages were sent for this part, and are in the run before, too.
             self._left_ns, early = self._initial_messages.begin_part(part, sent_ns)
-            self.run.keep({name: self.run.counts[name] - count for name, count in early.items()})
+            counts = self.run.counts
+            self.run.kept |= {name: counts[name] - count for name, count in early.items()}
             self.leaving, self._lost_of_leaving = self.run, self._losses
             self._leaves_s = time.monotonic() + LATE_S
             self._begin_run(new_run, log_time_ns)
@@ -239,7 +237,7 @@ class RunRecorder(ManagedNode):
         self.run, self._begun_ns = run, time.time_ns()
         for topic in self.recorded.values():
             topic.reset_counts(self._begun_ns)
-            run.add_topic(topic.run_topic)
+            run.add_topic(*topic.about)
         for message in self._initial_messages.begin_run(log_time_ns):
             if message.topic in run.counts:
                 run.write(*message[:4])
@@ -302,7 +300,7 @@ class RunRecorder(ManagedNode):
         topics = self.recorded.values()
         missed = sum(topic.lost for topic in topics)
         lost = f', {missed} missed' if missed else ''
-        first = [f'{t.before_discovery} of {t.name}' for t in topics if t.before_discovery]
+        first = [f'{count} of {t.name}' for t in topics if (count := t.before_discovery.total())]
         lost += f', {" and ".join(first)} {MISSED_BEFORE_DISCOVERY}' if first else ''
         if any(topic.unnumbered for topic in topics):
             lost += ' (losses cannot be counted: this middleware does not number messages)'
@@ -312,14 +310,14 @@ class RunRecorder(ManagedNode):
 
     def status(self) -> Status:
         if not self.active and self._error is None:
-            return Status(OK, f'inactive; {self.summary()}' if self.runs else 'inactive')
+            return OK, f'inactive; {self.summary()}' if self.runs else 'inactive', {}
         try:
             size, free = self.run.path.stat().st_size, shutil.disk_usage(self.run.folder).free
         except OSError as error:
             reason = f'{self.run.path}: {error.strerror}; nothing more can be recorded there'
             if self._error is None:
                 self._record_failure(RecordingError(reason))
-            return Status(ERROR, reason)
+            return ERROR, reason, {}
         topics = self.recorded.values()
         counts, unnumbered = Counter(self.run.counts), sum(t.unnumbered for t in topics)
         values = {
@@ -331,14 +329,14 @@ class RunRecorder(ManagedNode):
             **{t.name: f'{counts[t.name]} messages, {t.losses}, {t.gaps} gaps' for t in topics},
         }
         if self._error is not None:
-            return Status(ERROR, str(self._error), values)
+            return ERROR, str(self._error), values
         if self._refused:
-            return Status(ERROR, f'not recorded: {" ".join(sorted(self._refused))}', values)
+            return ERROR, f'not recorded: {" ".join(sorted(self._refused))}', values
         if free < 1_000_000_000:
-            return Status(WARN, 'the disk is almost full', values)
+            return WARN, 'the disk is almost full', values
         if self._too_late or any(topic.lost for topic in topics):
-            return Status(WARN, f'messages were missed{self._losses}', values)
-        return Status(OK, 'recording', values)
+            return WARN, f'messages were missed{self._losses}', values
+        return OK, 'recording', values
 
 
 def _summary(run: RunWriter, losses: str) -> str:

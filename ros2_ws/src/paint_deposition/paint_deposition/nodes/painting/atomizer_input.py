@@ -21,7 +21,7 @@ from paint_deposition.motion.stream_quality import StreamSteps
 from paint_deposition.motion.trajectory import SPRAYS_NOTHING
 from paint_deposition.motion.transforms import NoTransform
 from paint_deposition.nodes import topics
-from paint_deposition.nodes.frames import TfQueue, placed_in_order
+from paint_deposition.nodes.frames import TfQueue
 from paint_deposition.nodes.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ class AtomizerInput:
         spraying: whether the gun sprays, by the newest state; False before the first.
         last_poses: those that show the speed of the TCP now; programmed_m_per_s: that of the
             newest state, 0 or NaN: unknown.
+        topics: the subscriptions, which count what the middleware has lost since the last reset.
         tf_queue: poses that wait for their transform.
         refused_frames: poses refused for their frame, by frame; refusal: reason of the last.
         unpainted: poses received while the node was not active.
@@ -87,7 +88,7 @@ class AtomizerInput:
         self.tf_queue: TfQueue = deque()
         self.times_s: deque[tuple[float, float]] = deque(maxlen=100)
         subscribe = partial(AdaptiveSubscription, node, depth=node.values['pose_queue_depth'])
-        self._topics = [
+        self.topics = [
             subscribe(
                 PoseStamped, self._pose_topic,
                 lambda pose, info: self._new_poses.append((pose, info['source_timestamp'])),
@@ -107,11 +108,6 @@ class AtomizerInput:
         node.create_steady_timer(0.02, partial(self.take_pending, at_once=False))
         node.create_steady_timer(0.2, self._report_progress)
 
-    @property
-    def messages_lost(self) -> int:
-        """Messages that the middleware has lost since the last reset."""
-        return sum(topic.lost for topic in self._topics)
-
     def reset(self) -> None:
         """Reset the counts; poses that were not painted yet are dropped."""
         self.reset_counts()
@@ -128,7 +124,7 @@ class AtomizerInput:
         self.anomalies: Counter[str] = Counter()
         self.state_errors: set[str] = set()
         self.unpainted = 0
-        for topic in self._topics:
+        for topic in self.topics:
             topic.lost = 0
         self.steps = StreamSteps()
 
@@ -168,7 +164,7 @@ class AtomizerInput:
 
         They are painted at once, or when they fill a batch or have waited for long enough.
         """
-        for topic in (*self._node.frame.tf_topics, *self._topics):
+        for topic in (*self._node.frame.tf_topics, *self.topics):
             topic.take_pending()
         # Latched states may come behind others that were sent later.
         poses, states = [*self._new_poses], sorted(self._new_states, key=itemgetter(1))
@@ -177,7 +173,17 @@ class AtomizerInput:
         # Poses stay in the order in which they came.
         for message, sent_ns in merge(poses, states, key=itemgetter(1)):
             if isinstance(message, PoseStamped):
-                self._note_pose(message, sent_ns)
+                self.poses_received += 1
+                if len(message.header.frame_id) > LONGEST_NAME:
+                    message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
+                self._newest, self.sent_ns, self.pose_s = message, sent_ns, time.monotonic()
+                if self._state_ahead and sent_ns > self._state_ahead[1]:
+                    if self._state_ahead[0] - stamp_ns(message.header) > AHEAD_NS:
+                        ahead = 'states stamped over 1 s ahead of the poses sent after them'
+                        self.anomalies[f'{ahead}: set the clocks'] += 1
+                    self._state_ahead = None
+                if self.poses_received % POSES_PER_BATCH == 0:
+                    self._report_progress()
             else:
                 state_ns = stamp_ns(message.header)
                 # Before its poses after a pause, too: the next pose tells.
@@ -228,24 +234,10 @@ class AtomizerInput:
 
     # --- poses
 
-    def _note_pose(self, message: PoseStamped, sent_ns: int) -> None:
-        self.poses_received += 1
-        if len(message.header.frame_id) > LONGEST_NAME:
-            message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
-        self._newest, self.sent_ns = message, sent_ns
-        if self._state_ahead and sent_ns > self._state_ahead[1]:
-            if self._state_ahead[0] - stamp_ns(message.header) > AHEAD_NS:
-                ahead = 'states stamped over 1 s ahead of the poses sent after them'
-                self.anomalies[f'{ahead}: set the clocks'] += 1
-            self._state_ahead = None
-        self.pose_s = time.monotonic()
-        if self.poses_received % POSES_PER_BATCH == 0:
-            self._report_progress()
-
     def _place(self) -> None:
         """Put the poses whose transforms are known into the next batch."""
         frame = self._node.frame
-        for pose, placed in placed_in_order(self.tf_queue, frame.on_part, time.monotonic()):
+        for pose, placed in frame.placed_in_order(self.tf_queue):
             frame_id = pose.header.frame_id
             if not isinstance(placed, NoTransform):
                 self.anomalies['poses without a frame'] += not frame_id

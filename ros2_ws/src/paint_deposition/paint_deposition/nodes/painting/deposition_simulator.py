@@ -16,7 +16,6 @@ from paint_deposition.nodes.painting.film_display import (
     laid_by_gun,
     statistics_of,
 )
-from paint_deposition.nodes.painting.health import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
@@ -66,24 +65,21 @@ class DepositionSimulator(PaintingNode):
     }
 
     def _configure(self) -> Mapping[str, Task]:
-        super()._configure()
+        version = mesh_version(self.values['mesh_file'])
+        tasks = super()._configure()
         # In a group of their own, so that poses do not wait for the disk.
         saving = ReentrantCallbackGroup()
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self.display = FilmDisplay(self)
-        self.parts = PartChange(self, self._mesh_version, self._saving, saving)
+        self.parts = PartChange(self, version, self._saving, saving)
         self.publish()
-        return painting_tasks(self, self.display.diagnostic_values) | {'part': self.parts.status}
+        return {**tasks, 'film': self.display.film_status, 'part': self.parts.status}
 
     def _cleanup(self) -> None:
         self.parts.close()
         self._saving.shutdown()
         super()._cleanup()
-
-    def _load_files(self) -> None:
-        self._mesh_version = mesh_version(self.values['mesh_file'])
-        super()._load_files()
 
     def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         super()._validate(values, changed)
@@ -135,10 +131,24 @@ class DepositionSimulator(PaintingNode):
             part: description of the part for the statistics file.
         """
         film, surface, zones = self.film.snapshot(), self.surface, self.zones
-        values, names, details = dict(self.values), self.gun_names, self._details()
-        counts, files = [gun.counts.to_dict() for gun in self.film.guns], self.files_in_use
-        if part:
-            details['part'] = part
+        values, names, files = dict(self.values), self.gun_names, self.files_in_use
+        counts = [gun.counts.to_dict() for gun in self.film.guns]
+        effects = (effect.id for gun in self.film.guns for effect in gun.model.effects)
+        refused: dict[str, int] = {}
+        for source in self.inputs:
+            refused |= source.refused_frames
+        details: dict[str, Any] = {
+            'mesh_file': self.mesh_file,
+            'mesh_id': surface.mesh_id,
+            'frame_id': self.frame.frame_id,
+            'down': surface.down,
+            'model_file': files[0] if len({*files}) == 1 else '',
+            'zones_file': values['zones_file'],
+            'effects': list(dict.fromkeys(effects)),
+            'poses': self.film.counts.to_dict(),
+            'poses_in_other_frames': refused,
+            **({'part': part} if part else {}),
+        }
 
         def write() -> list[Path]:
             details['atomizers'] = [
@@ -161,21 +171,3 @@ class DepositionSimulator(PaintingNode):
             )  # fmt: skip
 
         return write
-
-    def _details(self) -> dict[str, Any]:
-        """What the statistics file says beside the figures of the film."""
-        refused = [source.refused_frames.items() for source in self.inputs]
-        effects = (effect.id for gun in self.film.guns for effect in gun.model.effects)
-        return {
-            'mesh_file': self.mesh_file,
-            'mesh_id': self.surface.mesh_id,
-            'frame_id': self.frame.frame_id,
-            'down': self.surface.down,
-            'model_file': self.files_in_use[0] if len({*self.files_in_use}) == 1 else '',
-            'zones_file': self.values['zones_file'],
-            'effects': list(dict.fromkeys(effects)),
-            'poses': self.film.counts.to_dict(),
-            'poses_in_other_frames': {
-                frame: count for frames in refused for frame, count in frames
-            },
-        }

@@ -5,6 +5,7 @@ import time
 from array import array
 from collections.abc import Callable, Mapping
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,11 +25,12 @@ from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FIGURES, FilmStatistics, film_statistics
 from paint_deposition.nodes import topics
-from paint_deposition.nodes.node import OK, WARN
+from paint_deposition.nodes.node import OK, WARN, Status
 from paint_deposition.nodes.painting.atomizer_input import LONGEST_NAME, MOST_NAMES
 from paint_deposition.nodes.painting.health import (
     DOUBTFUL,
     UNPAINTED,
+    film_status,
     sprays_without_poses,
     what_was_wrong,
 )
@@ -105,11 +107,12 @@ class LargeTopic:
     """
 
     def __init__(self, node: Node, message: type, topic: str, profile: QoSProfile) -> None:
-        self._subscribers = self._new_subscribers = 0
+        # The event of the last subscriber that came or left.
+        self._matched: Any = SimpleNamespace(current_count=0, total_count=0)
+        matched = PublisherEventCallbacks(matched=partial(setattr, self, '_matched'))
         self._publisher: Publisher = node.create_publisher(
-            message, topic, profile,
-            event_callbacks=PublisherEventCallbacks(matched=self._count_subscribers),
-        )  # fmt: skip
+            message, topic, profile, event_callbacks=matched
+        )
         # The last version sent, and the total number of subscribers by then.
         self._sent: tuple[int, int] | None = None
         self._sent_s = self._next_allowed_s = 0.0
@@ -117,9 +120,9 @@ class LargeTopic:
     def publish_if_wanted(self, version: int, make: Callable[[], Any]) -> None:
         """Publish a version if a subscriber lacks it and the link is free; else call it again."""
         # Not the publisher's own count, which grows before the event of a new subscriber.
-        wanted = version, self._new_subscribers
-        began_s = time.monotonic()
-        if not self._subscribers or wanted == self._sent or began_s < self._next_allowed_s:
+        matched, began_s = self._matched, time.monotonic()
+        wanted = version, matched.total_count
+        if not matched.current_count or wanted == self._sent or began_s < self._next_allowed_s:
             return
         acknowledged = self._publisher.wait_for_all_acked(Duration(nanoseconds=0))
         if not acknowledged and began_s < self._sent_s + ACKNOWLEDGE_TIMEOUT_S:
@@ -127,10 +130,6 @@ class LargeTopic:
         self._publisher.publish(make())
         self._sent, self._sent_s = wanted, time.monotonic()
         self._next_allowed_s = began_s + 5.0 * (self._sent_s - began_s)
-
-    def _count_subscribers(self, event: Any) -> None:
-        self._subscribers = event.current_count
-        self._new_subscribers += event.total_count_change
 
 
 class FilmDisplay:
@@ -175,11 +174,13 @@ class FilmDisplay:
             node.create_subscription(PoseProgress, topic, take, topics.PROGRESS)
         node.create_steady_timer(0.5, self._publish_trust)
 
-    def diagnostic_values(self) -> dict[str, object]:
-        """Values for the diagnostics of the film."""
+    def film_status(self) -> Status:
+        """The status of the film, and the share that each gun has in it."""
+        level, words, values = film_status(self._node)
         parts = zip(self._stats.atomizers, self._stats.atomizer_share, strict=True)
         each = {f'share of {gun}': f'{share:.1%}' for gun, share in parts if gun}
-        return {'last publication [ms]': f'{self._publish_duration_s * 1e3:.0f}', **each}
+        took = {'last publication [ms]': f'{self._publish_duration_s * 1e3:.0f}'}
+        return level, words, {**values, **took, **each}
 
     def _take_report(self, gun: str, report: PoseProgress) -> None:
         key = gun, report.reporter[:LONGEST_NAME]
@@ -268,7 +269,7 @@ class FilmDisplay:
         ends = self._scale.low, self._scale.high
         if ends != self._legend_ends:
             self._legend_ends = ends
-            self._legend.publish(legend(self._scale, 'µm', node.surface, at.frame_id))
+            self._legend.publish(legend(self._scale, node.surface, at.frame_id))
 
     def _mesh_message(self, frame_id: str) -> bytes:
         surface = self._node.surface
@@ -279,8 +280,8 @@ class FilmDisplay:
         return self._mesh(self._node.film.newest_ns or 0, self._scale.palette, rows)
 
 
-def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> MarkerArray:
-    """A bar in the scale's colours with values beside it, upright at the side of the part."""
+def legend(scale: ColourScale, surface: Surface, frame_id: str) -> MarkerArray:
+    """A bar in the scale's colours with values [um] beside it, upright at the side of the part."""
     across = across_axis(surface.outward, surface.down)
     up = -downhill_axis(surface.outward, surface.down)
     heights, widths = surface.vertices_m @ up, surface.vertices_m @ across
@@ -300,7 +301,7 @@ def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> Ma
     markers = [bar]
     for number, share in enumerate(np.linspace(0.0, 1.0, 5), start=1):
         label = white_marker(Marker.TEXT_VIEW_FACING, 'legend', number, frame_id)
-        label.text = f'{scale.low + (scale.high - scale.low) * share:g} {unit}'
+        label.text = f'{scale.low + (scale.high - scale.low) * share:g} µm'
         label.scale = Vector3(z=0.04 * size)
         label.pose.position = _point(corner + share * size * up + 0.1 * size * across)
         markers.append(label)

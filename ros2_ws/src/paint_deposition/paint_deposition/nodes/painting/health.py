@@ -1,24 +1,26 @@
 """The diagnostics of the nodes that paint, and what puts their film in doubt."""
 
+from __future__ import annotations
+
 import math
 import time
-from collections.abc import Callable, Mapping
-from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from paint_deposition.files.recordings.messages import STATE_TYPE
 from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.nodes.frames import SILENT_S
 from paint_deposition.nodes.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.painting.atomizer_input import (
     STATES_REFUSED,
     AtomizerInput,
 )
-from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.topics import gun_topic
 
-# Without poses for so long, a gun that sprays is reported.
-SILENT_S = 2.0
+if TYPE_CHECKING:
+    from paint_deposition.nodes.painting.painting_node import PaintingNode
+
 NO_BRUSH = 'no state names one of the brushes yet: nothing is painted'
 # What a count of poses and states is called, and whether the film lacks something because of it.
 COUNTS = {
@@ -38,24 +40,13 @@ DOUBTFUL = {name for name, lacks in COUNTS.values() if lacks} | {
 }  # fmt: skip
 
 
-def painting_tasks(
-    node: PaintingNode, film_values: Callable[[], Mapping[str, object]] = dict
-) -> dict[str, Callable[[], Status]]:
-    """The diagnostic tasks by name; `film_values` returns further values for the film's."""
-    poses = {
-        gun_topic(source.name, 'poses'): partial(poses_status, node, number)
-        for number, source in enumerate(node.inputs)
-    }
-    return {**poses, 'film': lambda: film_status(node, film_values())}
-
-
 def what_was_wrong(source: AtomizerInput, film: LiveFilm) -> dict[str, int]:
     """How often something was wrong with a gun's poses and states since the last reset."""
     return {
         **{words: getattr(film.counts, name) for name, (words, _) in COUNTS.items()},
         'steps faster than a robot': source.steps.jumps,
         **source.anomalies,
-        LOST: source.messages_lost,
+        LOST: sum(topic.lost for topic in source.topics),
         REFUSED: source.refused_frames.total(),
     }
 
@@ -87,26 +78,26 @@ def poses_status(node: PaintingNode, number: int) -> Status:
     if not node.active:
         if source.unpainted:
             words = f'inactive: {source.unpainted} poses came and were not painted'
-            return Status(WARN, words, values)
-        return Status(OK, 'inactive', values)
+            return WARN, words, values
+        return OK, 'inactive', values
     if another := _state_of_another_type(node, source.name):
         node.get_logger().error(another, once=True)
-        return Status(ERROR, another, values)
+        return ERROR, another, values
     if source.refused_frames and time.monotonic() - source.refused_s < 5.0:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
         words = (
             f'{wrong[REFUSED]} poses refused: they are in frame {frames}, the mesh is in '
             f"'{node.frame.frame_id}' and {source.refusal}"
         )
-        return Status(ERROR, words, values)
+        return ERROR, words, values
     warnings = [NO_BRUSH] if gun == NO_BRUSH and counts.received else []
     warnings += sprays_without_poses(source)
     warnings += [f'{count} {words}' for words, count in wrong.items() if count]
     warnings += sorted(source.state_errors)
     if warnings:
-        return Status(WARN, ', '.join(warnings), values)
+        return WARN, ', '.join(warnings), values
     is_silent = time.monotonic() - source.pose_s > SILENT_S
-    return Status(OK, 'waiting for poses' if is_silent else 'painting', values)
+    return OK, 'waiting for poses' if is_silent else 'painting', values
 
 
 def sprays_without_poses(source: AtomizerInput) -> list[str]:
@@ -130,7 +121,7 @@ def _state_of_another_type(node: PaintingNode, gun: str) -> str:
     return ''
 
 
-def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
+def film_status(node: PaintingNode) -> Status:
     """The status of part, model and computing time."""
     guns = node.film.guns
     # Computing time over duration of the motion; above 1 the node falls behind.
@@ -147,15 +138,14 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
         'poses remembered': sum(gun.log.poses for gun in guns),
         'real-time factor': f'{factor:.2f}',
         **{f'note {number}': note for number, note in enumerate(node.surface.notes, start=1)},
-        **more_values,
     }
     if node.model_problem:
-        return Status(WARN, node.model_problem, values)
+        return WARN, node.model_problem, values
     if not all(gun.log.complete for gun in guns):
         limit = f'over {node.values["pose_memory"]} poses (pose_memory)'
-        return Status(WARN, f'{limit}: a new model paints from then on only', values)
+        return WARN, f'{limit}: a new model paints from then on only', values
     if factor > 0.8:
         share = f'painting takes {factor:.0%} of the time that the motion lasts'
         remedy = 'poses may be lost; use a larger max_edge_length_m'
-        return Status(WARN, f'{share}: {remedy}', values)
-    return Status(OK, 'preparing a changed model' if node.repainting else 'up to date', values)
+        return WARN, f'{share}: {remedy}', values
+    return OK, 'preparing a changed model' if node.repainting else 'up to date', values

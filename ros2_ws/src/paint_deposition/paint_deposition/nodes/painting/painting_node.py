@@ -2,12 +2,13 @@
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Future
+from collections.abc import Iterable, Mapping
+from concurrent.futures import Future, InvalidStateError
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import numpy as np
-from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -22,56 +23,17 @@ from paint_deposition.nodes.frames import PartFrame
 from paint_deposition.nodes.managed_node import ManagedNode
 from paint_deposition.nodes.node import Task
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
+from paint_deposition.nodes.painting.health import film_status, poses_status
 from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
     models_from_parameters,
     read_part,
 )
+from paint_deposition.nodes.topics import gun_topic
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface, facing, toward_the_guns
 
 MODEL_PARAMETERS = {'model_file', 'model_files'}
-
-
-class Repainting:
-    """Compiles models in a thread, and repaints the motion so far with them.
-
-    Args:
-        current: the films to replace, one for each gun; painting goes on in them meanwhile.
-        make: creates the new, unpainted films; called in the thread.
-        from_start: whether to repaint the motion so far.
-
-    Attributes:
-        logs: the motion so far of each gun, to which poses are added meanwhile.
-        prepared: the films, or an error, once the thread has ended.
-        aborted: set it to stop as soon as possible, but after a compilation under way.
-    """
-
-    def __init__(
-        self, current: LiveFilms, make: Callable[[], LiveFilms], from_start: bool
-    ) -> None:
-        self.logs, self.from_start = [gun.log for gun in current.guns], from_start
-        self._make = make
-        self.aborted = threading.Event()
-        self.prepared: Future[LiveFilms] = Future()
-        threading.Thread(target=self._run, name='repainting', daemon=True).start()
-
-    def _run(self) -> None:
-        try:
-            films = self._make()
-            for film in films.guns:
-                film.warm_up()
-            repainted = zip(films.guns, self.logs, strict=True) if self.from_start else ()
-            for film, log in repainted:
-                # The rest is for the thread of the executor, which must not be blocked.
-                while log.poses - film.log.poses > 250 and log.complete:
-                    for event in log.events(film.log.poses, film.log.changes):
-                        if self.aborted.is_set():
-                            return
-                        film.replay([event])
-            self.prepared.set_result(films)
-        except BaseException as error:  # raised again where the films are adopted
-            self.prepared.set_exception(error)
 
 
 class PaintingNode(ManagedNode, ABC):
@@ -88,24 +50,40 @@ class PaintingNode(ManagedNode, ABC):
         files_in_use: the file of the model with which each gun paints, '' for the default.
         film: the film so far, by one gun or several.
         inputs: the subscriptions, one for each gun.
-        repainting: the repainting under way, if any.
+        repainting: films with other models, once a thread has compiled these and repainted the
+            motion so far; None if that is not under way.
         model_problem: why the models that were set last are not in use, '' if they are.
     """
 
     PRECISION = 'single'
-    repainting: Repainting | None = None
+    repainting: Future[LiveFilms] | None = None
     model_problem = ''
     _shown: CommonFilm | None = None
 
     def _configure(self) -> Mapping[str, Task]:
+        self.gun_names: list[str] = self.values['atomizers'] or ['']
+        self.mesh_file: str = self.values['mesh_file']
+        self.model_problem = ''
+        self._noted: set[str] = set()
+        self.frame = PartFrame(self, self.values['frame_id'])
+        self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
+        self.models, self._files = models_from_parameters(self.values)
+        self.files_in_use = self._files
+        self.get_logger().info('getting ready; a new model is compiled first')
+        self._take_part(self.prepare(self.mesh_file))
         self.inputs = [AtomizerInput(self, number) for number in range(len(self.gun_names))]
         if self.autostarting:  # messages received before the node is active are painted
             self.hold()
         self._shown = None
         self.create_service(Trigger, '~/reset', lambda *_: self.reset())
         self.create_steady_timer(0.1, self._update)
-        self.show_timer = self._new_show_timer()
-        return {}
+        period_s = 1.0 / self.values['publish_rate_hz']
+        self.show_timer = self.create_steady_timer(period_s, self.publish)
+        poses = {
+            gun_topic(source.name, 'poses'): partial(poses_status, self, number)
+            for number, source in enumerate(self.inputs)
+        }
+        return {**poses, 'film': partial(film_status, self)}
 
     def _activate(self) -> None:
         self.release()
@@ -115,23 +93,9 @@ class PaintingNode(ManagedNode, ABC):
             source.take_pending()
 
     def _cleanup(self) -> None:
-        self._abort_repainting()
-
-    def _load_files(self) -> None:
-        self.gun_names: list[str] = self.values['atomizers'] or ['']
-        self.mesh_file: str = self.values['mesh_file']
-        self.model_problem = ''
-        self._noted: set[str] = set()
-        self.frame = PartFrame(self, self.values['frame_id'])
-        self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
-        self.models = models_from_parameters(self.values)
-        self._files = self.files_in_use = self._named_files()
-        self.get_logger().info('getting ready; a new model is compiled first')
-        self._take_part(self.prepare(self.mesh_file))
-
-    def _named_files(self) -> list[str]:
-        """The file of each gun's model, by the parameters."""
-        return self.values['model_files'] or [self.values['model_file']] * len(self.gun_names)
+        if self.repainting is not None:
+            self.repainting.cancel()
+            self.repainting = None
 
     # --- for the subclass
 
@@ -253,37 +217,50 @@ class PaintingNode(ManagedNode, ABC):
             for gun in self.film.guns:
                 gun.trigger_latency_s = self.values['trigger_latency_s']
         if names & MODEL_PARAMETERS:
-            self.models, self._files = self._next_models, self._named_files()
+            self.models, self._files = self._next_models
             self._repaint(from_start=self.values['repaint'])
         if 'publish_rate_hz' in names:
-            self.destroy_timer(self.show_timer)
-            self.show_timer = self._new_show_timer()
+            self.show_timer.timer_period_ns = round(1e9 / self.values['publish_rate_hz'])
+            self.show_timer.reset()
         self._shown = None
 
-    def _new_show_timer(self) -> Timer:
-        return self.create_steady_timer(1.0 / self.values['publish_rate_hz'], self.publish)
-
     def _repaint(self, from_start: bool = True) -> None:
-        """Start to repaint with the current models and parameters, in a thread."""
-        self._abort_repainting()
-        surface, points, models = self.surface, self.points, self.models
+        """Start to compile the current models, and to repaint the motion so far, in a thread.
 
-        def make() -> LiveFilms:
-            for effect in (effect for model in models for effect in model.effects):
-                if effect.file is not None:
-                    try_effect(type(effect), effect.file)
-            return self._unpainted(surface, points, models)
-
-        self.repainting = Repainting(self.film, make, from_start)
-
-    def _abort_repainting(self) -> None:
+        Painting goes on meanwhile, in the films and their logs as they are.
+        """
         if self.repainting is not None:
-            self.repainting.aborted.set()
-            self.repainting = None
+            self.repainting.cancel()
+        surface, points, models = self.surface, self.points, self.models
+        logs = [gun.log for gun in self.film.guns]
+        prepared: Future[LiveFilms] = Future()
+
+        def work() -> None:
+            try:
+                for effect in (effect for model in models for effect in model.effects):
+                    if effect.file is not None:
+                        try_effect(type(effect), effect.file)
+                films = self._unpainted(surface, points, models)
+                for film in films.guns:
+                    film.warm_up()
+                for film, log in zip(films.guns, logs, strict=True) if from_start else ():
+                    # The rest is for the thread of the executor, which must not be blocked.
+                    while log.poses - film.log.poses > 250 and log.complete:
+                        for event in log.events(film.log.poses, film.log.changes):
+                            if prepared.cancelled():
+                                return
+                            film.replay([event])
+                prepared.set_result(films)
+            except BaseException as error:  # raised again where the films are adopted
+                with suppress(InvalidStateError):  # it was cancelled
+                    prepared.set_exception(error)
+
+        self.repainting, self._repainted_logs = prepared, logs if from_start else None
+        threading.Thread(target=work, name='repainting', daemon=True).start()
 
     def _update(self) -> None:
         """Adopt a repainted film, and turn the part inside out if the guns point at its back."""
-        if self.repainting is not None and self.repainting.prepared.done():
+        if self.repainting is not None and self.repainting.done():
             self._adopt(self.repainting)
         oriented = self._toward_the_guns()
         if oriented is self.surface:
@@ -331,16 +308,16 @@ class PaintingNode(ManagedNode, ABC):
                 return toward_the_guns(self.surface, [(positions, axes)])
         return self.surface
 
-    def _adopt(self, repainting: Repainting) -> None:
+    def _adopt(self, prepared: Future[LiveFilms]) -> None:
         """Go on with the films that are prepared, or with the models where only they change."""
         self.repainting = None
         self.model_problem = ''
-        guns, logs = self.film.guns, repainting.logs
+        guns, logs = self.film.guns, self._repainted_logs
         try:
-            films = repainting.prepared.result()
-            if not repainting.from_start or not all(log.complete for log in logs):
-                for gun, prepared in zip(guns, films.guns, strict=True):
-                    gun.switch_model(prepared.model)
+            films = prepared.result()
+            if logs is None or not all(log.complete for log in logs):
+                for gun, film in zip(guns, films.guns, strict=True):
+                    gun.switch_model(film.model)
             elif any(gun.log is not log for gun, log in zip(guns, logs, strict=True)):
                 self._repaint()  # the motion was restarted meanwhile
                 return

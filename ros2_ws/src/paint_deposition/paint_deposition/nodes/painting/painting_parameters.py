@@ -136,15 +136,18 @@ def model_from_parameters(
 
 def models_from_parameters(
     values: Mapping[str, Any], load: LoadEffect = load_effect_file
-) -> tuple[DepositionModel, ...]:
-    """The model of each gun, from `model_files` or `model_file`; one model without `atomizers`.
+) -> tuple[tuple[DepositionModel, ...], list[str]]:
+    """The model of each gun, and its file, from `model_files` or `model_file`, '' for the default.
+
+    Without `atomizers` there is one of each.
 
     Raises:
         PaintError: as above, or the number of models is not that of the guns.
     """
     guns, files = values['atomizers'] or [''], values['model_files']
     if not files:
-        return (model_from_parameters(values, load),) * len(guns)
+        models = (model_from_parameters(values, load),) * len(guns)
+        return models, [values['model_file']] * len(guns)
     if len(files) != len(guns) or values['model_file']:
         another = ' and model_file another' if values['model_file'] else ''
         raise PaintError(
@@ -153,7 +156,7 @@ def models_from_parameters(
         )
     models = tuple(model_from_parameters({**values, 'model_file': file}, load) for file in files)
     require_same_film_effects(dict(zip(guns, models, strict=True)))
-    return models
+    return models, files
 
 
 def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:

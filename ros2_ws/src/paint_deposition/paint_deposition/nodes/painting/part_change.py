@@ -113,11 +113,11 @@ class PartChange:
             'meshes prepared': ' '.join(ready) or 'none',
         }
         if self._save_error:
-            return Status(ERROR, self._save_error, values)
+            return ERROR, self._save_error, values
         # A change that takes longer delays the first poses on the part.
         if self._gap_s > 0.05:
             late = f'the first poses of {part.run} waited {self._gap_s:.2f} s for its mesh'
-            return Status(WARN, f'{late}: prepare it before the part comes', values)
+            return WARN, f'{late}: prepare it before the part comes', values
         # Less paint may fly past before the part.
         emitted_cm3 = film.used.emitted_cm3
         if emitted_cm3 >= 5.0 and film.raw_um.max() <= NO_PAINT_UM:
@@ -125,8 +125,8 @@ class PartChange:
                 f'{emitted_cm3:.0f} cm3 were sprayed and nothing lands on the part: check '
                 'part_pose, mesh_scale and the TCP, whose z axis points at the surface'
             )
-            return Status(WARN, beside, values)
-        return Status(OK, part.run or 'the part has no serial number', values)
+            return WARN, beside, values
+        return OK, part.run or 'the part has no serial number', values
 
     # --- the change
 
@@ -348,8 +348,11 @@ class PartChange:
         part.guns = [*node.gun_names]
         part.states_sent_ns = [source.state_sent_ns for source in node.inputs]
         part.states = [
-            state_message(name, change)
+            state_message(
+                header=header(name, change.stamp_ns), spraying=change.flow > 0.0,
+                flow=change.flow, brush=change.brush,
+            )
             for name, gun in zip(part.guns, node.film.guns, strict=True)
             for change in gun.carried_over
-        ]
+        ]  # fmt: skip
         self._publisher.publish(part)
