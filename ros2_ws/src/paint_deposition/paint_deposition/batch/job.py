@@ -37,7 +37,6 @@ from paint_deposition.part.surface import Surface
 NOTHING = 'nothing'
 # Columns that hold a list in each row: the film at every vertex, the gauge at every reading.
 PREDICTED = 'predicted_um'
-WARNINGS = 'warnings'
 
 
 @dataclass
@@ -81,6 +80,11 @@ class Job:
             digest = digest_of(code_digest(), model_digest(model), own, options, inputs)
             job.cases.append(Case(digest, {'model': model, **options}, inputs))
         return job
+
+    @property
+    def varied(self) -> list[str]:
+        """Names of what varies."""
+        return list(dict.fromkeys(name for values in self.values for name in values))
 
     def _named(self, key: str, values: Values) -> Path | None:
         name = values.get(key, getattr(self.file, key))
@@ -203,7 +207,7 @@ def computed(
         'sigma_n': statistics.std_dev_um / statistics.mean_um if statistics.mean_um else None,
         'spraying_time_s': film.path.spraying_time_s,
         'film_sha256': hashlib.sha256(film.film_um.tobytes()).hexdigest(),
-        WARNINGS: '; '.join(film.warnings),
+        'warnings': '; '.join(film.warnings),
     }
     if film.predicted_um is not None:
         figures[PREDICTED] = film.predicted_um.tolist()

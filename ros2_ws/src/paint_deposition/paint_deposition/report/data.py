@@ -10,12 +10,13 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
-from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedLaw, LearnedMap
+from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedMap
 from paint_deposition.film.common_film import sum_um
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import wanted_at
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.profiles import Profile, profiles_of
+from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.estimates import estimates
@@ -45,7 +46,7 @@ class ReportData:
             of models side by side each.
         diagnosis: None after a comparison alone.
         older: history of the model that a diagnosis started from, as in its file.
-        names: of models that stand side by side; none where one model followed from another.
+        beside: models that stand side by side; None where one followed from another.
         models: base first, best last. model: the best one.
         improved: whether there is a before and an after.
         model_names: what the models are called where both are shown.
@@ -62,12 +63,11 @@ class ReportData:
         older: Sequence[Mapping[str, Any]] = (),
     ) -> None:
         self.older = older
-        self.names: tuple[str, ...] = ()
+        self.beside = result if isinstance(result, SideBySide) else None
         self.diagnosis: Diagnosis | None = None
         self.comparisons: tuple[Comparison, ...]
         self.proposals: tuple[Sequence[Place], Sequence[Spray]] = ((), ())
         if isinstance(result, SideBySide):
-            self.names = tuple(result.by_name)
             self.comparisons = tuple(result.by_name.values())
         elif isinstance(result, Comparison):
             self.comparisons = (result,)
@@ -80,14 +80,15 @@ class ReportData:
         self.models = tuple(comparison.model for comparison in self.comparisons)
         self.residuals_um = [comparison.points.residual_um for comparison in self.comparisons]
         self.model, count = self.models[-1], len(self.models)
-        self.improved = count > 1 and not self.names
-        self.model_names: tuple[str, ...] = self.names or ('model',)
+        self.improved = count > 1 and not self.beside
+        self.model_names: tuple[str, ...] = ('model',)
         self.colours: tuple[str, ...] = MODELS[:count]
         self.lines: list[dict[str, Any]] = [{'color': ACCENT, 'width': 3.5}]
         if self.improved:
             self.model_names, self.colours = ('model before', 'model after'), (BEFORE, ACCENT)
             self.lines.insert(0, {'color': INK, 'width': 1.2})
-        elif self.names:
+        elif self.beside:
+            self.model_names = tuple(self.beside.by_name)
             self.lines = [{'color': colour, 'width': 2.2} for colour in self.colours]
 
     @cached_property
@@ -204,14 +205,18 @@ def class_rows(data: ReportData) -> list[dict[str, Any]]:
         parameters = [
             _parameter(effect, name, *astuple(value)) for name, value in found.parameters.items()
         ]
+        accepted = data.diagnosis is not None and found.best in data.diagnosis.accepted
+        learned, sure = words.is_learned(found.best), found.probability > SURE
         rows.append({
             'id': found.best, 'found': found, 'name': words.effect_name(found.best),
-            'learned': words.is_learned(found.best),
             'like': like, 'others': [words.effect_name(member) for member in like],
-            'accepted': data.diagnosis is not None and found.best in data.diagnosis.accepted,
+            'accepted': accepted, 'learned': learned,
+            # A diagnosis adds effects that it is sure of, and keeps learned laws for what they
+            # predict: others were added by the user.
+            'asked': accepted and not (found.probability == 1.0 if learned else sure),
             'meaning': words.effect_meaning(effect),
             'signature': effect.signature if effect else '',
-            'parameters': parameters + _learned(data.model.effect(found.best)),
+            'parameters': parameters + words.learned_rows(data.model.effect(found.best)),
         })  # fmt: skip
     return rows
 
@@ -226,14 +231,6 @@ def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[s
     return {'words': words.parameter_words(name, unit)} | dict(printed)
 
 
-def _learned(effect: Effect | None) -> list[dict[str, str]]:
-    """The curve and the range of a learned law; nothing for other effects."""
-    if not isinstance(effect, LearnedLaw):
-        return []
-    keys = ('words', 'value', 'unit')
-    return [dict(zip(keys, row, strict=True)) for row in words.learned_words(effect)]
-
-
 def law_rows(data: ReportData) -> list[dict[str, str]]:
     """Learned laws of the best model: where each holds, and how well a curve is known."""
     rows = []
@@ -244,8 +241,8 @@ def law_rows(data: ReportData) -> list[dict[str, str]]:
         elif isinstance(law, LearnedFootprint):
             rows.append(row | {'kind': 'footprint', 'ends': words.number(1e3 * law.reach_m)})
         elif isinstance(law, LearnedCurve):
-            _, ends, unit = words.learned_words(law)[1]
-            row |= {'kind': 'curve', 'ends': ends, 'unit': unit}
+            over = words.learned_rows(law)[1]
+            row |= {'kind': 'curve', 'ends': over['value'], 'unit': over['unit']}
             if law.sd:  # where the band of the curve is narrow, and where it is wide
                 at = np.linspace(law.low, law.high, 101)
                 half, shown = TWO_SIDED_95 * law.deviation(at), counted_from_1(law.covariate, at)
@@ -284,7 +281,7 @@ def effect_rows(data: ReportData) -> list[dict[str, Any]]:
     rows = []
     for effect in data.model.effects:
         found = known.get(effect.id, {})
-        parameters = _learned(effect)
+        parameters = words.learned_rows(effect)
         for name in effect.parameters():
             values = astuple(found[name]) if name in found else [getattr(effect, name)]
             parameters.append(_parameter(type(effect), name, *values))
