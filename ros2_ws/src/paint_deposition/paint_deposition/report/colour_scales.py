@@ -58,14 +58,18 @@ class ColourScale:
     high: float
     palette: np.ndarray  # (259, 4) uint8 RGBA
 
-    def rgba(self, values: np.ndarray, shown: np.ndarray) -> np.ndarray:
-        """(V, 4) uint8 colours of values (V,); bare metal's where not ``shown`` (V,) bool."""
+    def rows(self, values: np.ndarray, shown: np.ndarray) -> np.ndarray:
+        """(V,) row of the palette for each value (V,); bare where not ``shown`` (V,) bool."""
         share = (values - self.low) * (TABLE / (self.high - self.low))
         row = np.clip(np.nan_to_num(share), 0, TABLE - 1).astype(np.int16)
         row[values < self.low] = UNDER_ROW
         row[values > self.high] = OVER_ROW
         row[~shown | np.isnan(values)] = BARE_ROW
-        return self.palette[row]
+        return row
+
+    def rgba(self, values: np.ndarray, shown: np.ndarray) -> np.ndarray:
+        """(V, 4) uint8 colours; see ``rows``."""
+        return self.palette[self.rows(values, shown)]
 
 
 def film_scale(film_um: np.ndarray, low_um: float = 0.0, high_um: float = 0.0) -> ColourScale:
