@@ -262,6 +262,7 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
 
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[str]:
+    from paint_deposition.effects.learned_curves import LearnedCurve
     from paint_deposition.report import words
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
@@ -271,8 +272,12 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[s
         label = how if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
         yield f'  {label}{effects.best}: {words.probability_words(effects)}{others}'
-        for line in words.law_lines(diagnosis.model.effect(effects.best)):
-            yield f'    {line}'
+        law = diagnosis.model.effect(effects.best)
+        if rows := words.learned_rows(law):
+            shape = ', '.join(' '.join(row.values()).rstrip() for row in rows)
+            yield f'    {words.effect_name(effects.best)}: {shape}'
+        if isinstance(law, LearnedCurve) and law.sd:
+            yield f'    {words.form_words(law)}'
         for name, value in effects.parameters.items():
             yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
     before, after = diagnosis.history[0], diagnosis.history[-1]

@@ -90,7 +90,7 @@ def doctor_command(as_json: bool) -> None:
         f'{platform.platform(terse=True)} {platform.machine()}'
     )
     findings: list[Finding] = [('paint', versions, None, '')]
-    for look in (_libraries, _ros, _processor, _rapid, _known_film):
+    for look in (_libraries, _ros, _processor, _known_film):
         try:
             findings += look()
         except Exception as error:  # noqa: PERF203 (whatever a broken installation raises)
@@ -122,6 +122,8 @@ def _libraries() -> Iterator[Finding]:
     """Versions of what the package and its extras ask for, and which are missing or too old."""
     from packaging.requirements import Requirement
 
+    from paint_deposition.files.rapid.parser import parse_modules
+
     wanted = map(Requirement, metadata.requires('paint_deposition') or [])
     for marker, needed in groupby(wanted, lambda one: str(one.marker or '')):
         if 'test' in marker:
@@ -136,6 +138,8 @@ def _libraries() -> Iterator[Finding]:
         # A marker is that of an extra: extra == "many".
         name, ok = (f'extra {marker[10:-1]}', None) if marker else ('libraries', not unfit)
         yield name, ', '.join(found), ok, remedy
+    # The package lark-parser puts another lark in the place of the one that is asked for.
+    parse_modules('MODULE Try\n  PROC main()\n    PaintL p1, v100;\n  ENDPROC\nENDMODULE', 'Try')
 
 
 def _ros() -> Iterator[Finding]:
@@ -168,14 +172,6 @@ def _processor() -> Iterator[Finding]:
     threads = f'{numba.get_num_threads()} threads on {os.cpu_count()} processors'
     found = f'{llvm.get_host_cpu_name()}, {features}; {threads}; code compiled for {KIND}'
     yield 'processor', found, None, ''
-
-
-def _rapid() -> Iterator[Finding]:
-    from paint_deposition.files.rapid.parser import parse_modules
-
-    # The package lark-parser puts another lark in the place of the one that is asked for.
-    parse_modules('MODULE Try\n  PROC main()\n    PaintL p1, v100;\n  ENDPROC\nENDMODULE', 'Try')
-    yield 'RAPID', 'a program is read', True, ''
 
 
 def _known_film() -> Iterator[Finding]:

@@ -23,19 +23,9 @@ from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.readings import root_mean_square
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.report import words
 from paint_deposition.report.colour_scales import ACCENT, BEFORE, INK, MODELS, TWO_SIDED_95
-
-# What a parameter of the pattern is called: symbol, meaning, unit.
-SYMBOLS = {
-    'K1_cm3_per_s': ('K1', 'deposited solids rate', 'cm³/s'),
-    'K2': ('K2', 'weight of the centred Gaussian', ''),
-    'K3': ('K3', 'asymmetry of the ring', ''),
-    'phi_rad': ('φ', 'phase of the asymmetry', '°'),
-    'r_m': ('r', 'radius of the ring', 'mm'),
-    'sigma1_m': ('σ1', 'width of the ring', 'mm'),
-    'sigma2_m': ('σ2', 'width of the centred Gaussian', 'mm'),
-}
 
 
 class ReportData:
@@ -224,11 +214,14 @@ def class_rows(data: ReportData) -> list[dict[str, Any]]:
 def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[str, str]:
     """A parameter in words: its value, and the ends of its 95 % interval if there is one."""
     unit = effect.parameters()[name]['unit'] if effect else ''
+    return {'words': words.parameter_words(name, unit)} | _printed(unit, *values)
+
+
+def _printed(unit: str, *values: float) -> dict[str, str]:
     # A value below this share of its interval is printed as none.
     if abs(values[0]) < 1e-4 * np.ptp(values):
         values = (0.0, *values[1:])
-    printed = zip(('unit', 'value', 'low', 'high'), words.in_unit(unit, *values), strict=False)
-    return {'words': words.parameter_words(name, unit)} | dict(printed)
+    return dict(zip(('unit', 'value', 'low', 'high'), words.in_unit(unit, *values), strict=False))
 
 
 def law_rows(data: ReportData) -> list[dict[str, str]]:
@@ -264,14 +257,12 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     brushes, rows = data.model.brushes, []
     of = [f'brush {brush.number}: ' if len(brushes) > 1 else '' for brush in brushes] or ['']
     for (whose, planar), name in product(zip(of, data.model.patterns, strict=True), PATTERN_NAMES):
-        symbol, meaning, unit = SYMBOLS[name]
-        factor = {'mm': 1e3, '°': float(np.degrees(1.0))}.get(unit, 1.0)
-        value = words.number(factor * getattr(planar, name), 4)
-        row = {'symbol': symbol, 'words': whose + meaning, 'unit': unit, 'value': value}
-        if name in found:
-            ends = (words.number(factor * end) for end in (found[name].low, found[name].high))
-            row['interval'] = ' to '.join(ends)
-        rows.append(row)
+        # 'r, offset radius of the ring [m]'
+        symbol, _, described = str(PlanarPattern.model_fields[name].description).partition(', ')
+        meaning, _, unit = described.removesuffix(']').partition(' [')
+        ends = (found[name].low, found[name].high) if name in found else ()
+        told = {'symbol': symbol, 'words': whose + meaning}
+        rows.append(told | _printed(unit, getattr(planar, name), *ends))
     return rows
 
 

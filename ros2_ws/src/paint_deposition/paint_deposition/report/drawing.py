@@ -145,28 +145,7 @@ class PartPicture:
     def draw(self, axes: Axes, rgba: np.ndarray) -> None:
         """The part in colours of its vertices, (V, 4) uint8: no light falls on them."""
         draw_triangles(axes, self.flat_m[self.faces], rgba[self.faces] / 255.0)
-        self._draw_edges(axes)
-
-    def draw_bands(
-        self,
-        axes: Axes,
-        film_um: np.ndarray,
-        ends_um: list[float],
-        colours: list[str],
-        within: np.ndarray | None = None,
-    ) -> None:
-        """The part with a colour for each band of the film, (V,) at the vertices [um].
-
-        Where ``within`` (V,) is below a half it is left out; default: nowhere.
-        """
-        triangles = self._triangles()
-        least, most = min(film_um.min(), ends_um[0]), max(film_um.max(), ends_um[-1])
-        levels = [least - 1.0, *ends_um, most + 1.0]
-        bands = axes.tricontourf(triangles, film_um, levels, colors=colours)
-        if within is not None:
-            outline = axes.tricontourf(triangles, within, [0.5, 2.0], alpha=0.0)
-            bands.set_clip_path(outline.get_paths()[0], axes.transData)
-        self._draw_edges(axes)
+        self.draw_edges(axes)
 
     def zone_shares(self, zones: PointZones) -> dict[int, np.ndarray]:
         """(V,) 1 in each zone and 0 outside, smoothed: its border is at a half, not by triangles.
@@ -194,7 +173,7 @@ class PartPicture:
         for number, share in self.zone_shares(zones).items():
             if number < 0:
                 continue
-            axes.tricontour(self._triangles(), share, [0.5], colors=INK, linewidths=1.4)
+            axes.tricontour(self.triangles(), share, [0.5], colors=INK, linewidths=1.4)
             own = share[self.faces[self.seen]].mean(axis=1) > 0.5
             if not own.any():
                 continue
@@ -208,7 +187,7 @@ class PartPicture:
                 zorder=5, path_effects=PALE_HALO,
             )  # fmt: skip
 
-    def _triangles(self) -> Triangulation:
+    def triangles(self) -> Triangulation:
         """The triangles that are seen."""
         return Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
 
@@ -219,13 +198,14 @@ class PartPicture:
         if not len(levels) or not self.seen.any():
             return
         lines = axes.tricontour(
-            self._triangles(), film_um, levels, colors=INK, linewidths=0.6, alpha=0.55
+            self.triangles(), film_um, levels, colors=INK, linewidths=0.6, alpha=0.55
         )
         for label in axes.clabel(lines, fontsize=7.5, fmt='%g', inline_spacing=3):
             # Level, or labels on upright lines would read upward here and downward there.
             label.set(path_effects=PALE_HALO, rotation=0.0, transform_rotates_text=False)
 
-    def _draw_edges(self, axes: Axes) -> None:
+    def draw_edges(self, axes: Axes) -> None:
+        """Visible creases and free edges."""
         axes.add_collection(LineCollection(list(self.edges_m), colors=INK, linewidths=0.8), False)
 
     def dress(self, axes: Axes, low: np.ndarray, high: np.ndarray) -> None:

@@ -145,7 +145,13 @@ def _draw_band(
                 ends.append(end)
                 colours.append(colour)
         colours.append(HIGH if wanted.target_um else GRID)
-        part.draw_bands(axes, film_um, ends, colours, shares[number] if below else None)
+        least, most = min(film_um.min(), ends[0]) - 1.0, max(film_um.max(), ends[-1]) + 1.0
+        levels = [least, *ends, most]
+        bands = axes.tricontourf(part.triangles(), film_um, levels, colors=colours)
+        if below:
+            outline = axes.tricontourf(part.triangles(), shares[number], [0.5, 2.0], alpha=0.0)
+            bands.set_clip_path(outline.get_paths()[0], axes.transData)
+        part.draw_edges(axes)
     part.draw_zones(axes, zones, spray)
     draw_tool_path(axes, spray, part.view, low, high)
 

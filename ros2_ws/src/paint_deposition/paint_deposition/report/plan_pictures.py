@@ -157,7 +157,22 @@ def _ratios(one: float, other: float) -> tuple[float, float]:
 
 
 def _draw_gun(axes: Axes, view: View, surface: Surface, spray: SprayPath, size_m: float) -> None:
-    _draw_part(axes, view, surface, size_m)
+    toward = face_normals(surface.vertices_m, surface.faces) @ view.toward
+    order = np.argsort(surface.vertices_m[surface.faces].mean(axis=1) @ view.toward)
+    # The back of a sheet is seen from some sides: it is darker.
+    light = np.where(toward >= 0.0, 0.75 + 0.25 * toward, 0.6)[order]
+    colours = np.array(to_rgba(PART_COLOUR)) * np.column_stack([light] * 3 + [np.ones(len(light))])
+    flat = view.flat(surface.vertices_m)
+    draw_triangles(axes, flat[surface.faces[order]], np.repeat(colours[:, np.newaxis], 3, axis=1))
+    axes.add_collection(LineCollection(list(view.flat(surface.rim_m)), colors=INK, linewidths=0.7))
+    # Smaller parts of a picture are marked: they would not be seen.
+    if np.ptp(flat, axis=0).max() < 0.02 * size_m:
+        axes.plot(*flat.mean(axis=0), marker='s', markersize=5, color=INK)
+        axes.annotate(
+            'the part', flat.mean(axis=0), xytext=(8, 4), textcoords='offset points', fontsize=9,
+            color=INK,
+        )  # fmt: skip
+    axes.update_datalim(flat)
     # Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
     travel, apart_m = np.cumsum(spray.dwell_s * spray.speed_m_per_s), 0.04 * size_m
     evenly_m = np.arange(0.5 * apart_m, travel[-1], apart_m)
@@ -176,27 +191,6 @@ def _draw_gun(axes: Axes, view: View, surface: Surface, spray: SprayPath, size_m
     axes.grid(True, color=GRID, linewidth=0.8)
     axes.set_axisbelow(True)
     dress(axes, view)
-
-
-def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:
-    normals = face_normals(surface.vertices_m, surface.faces)
-    toward = normals @ view.toward
-    depth = surface.vertices_m[surface.faces].mean(axis=1) @ view.toward
-    order = np.argsort(depth)
-    # The back of a sheet is seen from some sides: it is darker.
-    light = np.where(toward >= 0.0, 0.75 + 0.25 * toward, 0.6)[order]
-    colours = np.array(to_rgba(PART_COLOUR)) * np.column_stack([light] * 3 + [np.ones(len(light))])
-    flat = view.flat(surface.vertices_m)
-    draw_triangles(axes, flat[surface.faces[order]], np.repeat(colours[:, np.newaxis], 3, axis=1))
-    axes.add_collection(LineCollection(list(view.flat(surface.rim_m)), colors=INK, linewidths=0.7))
-    # Smaller parts of a picture are marked: they would not be seen.
-    if np.ptp(flat, axis=0).max() < 0.02 * size_m:
-        axes.plot(*flat.mean(axis=0), marker='s', markersize=5, color=INK)
-        axes.annotate(
-            'the part', flat.mean(axis=0), xytext=(8, 4), textcoords='offset points', fontsize=9,
-            color=INK,
-        )  # fmt: skip
-    axes.update_datalim(flat)
 
 
 def write_improvement_picture(path: str | Path, result: Improvement) -> Path:

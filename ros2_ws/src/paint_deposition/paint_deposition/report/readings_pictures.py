@@ -15,7 +15,6 @@ from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.regions import interpolate_over_surface
 from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration
-from paint_deposition.inference.fitting.panel import PanelFit
 from paint_deposition.report.colour_scales import (
     ACCENT,
     BEFORE,
@@ -46,7 +45,6 @@ from paint_deposition.report.film_pictures import page_film
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
 # A profile's two charts with the room around them [in].
 PROFILE_IN = PAGE_IN, 3.0
-LINE_POINTS = 600
 # The longer side of a part with its points [in].
 PART_IN = 9.0
 
@@ -195,36 +193,30 @@ def write_calibration_pictures(
     written = [save_picture(comparison_figure(data), folder / f'profiles.{suffix}')]
     panels = [panel for panel in calibration.panels if panel is not None]
     if panels:
-        figure = new_figure(6.4, 4.2)
-        draw_collapse(figure.subplots(), calibration, panels[0])
+        # Eq. (3) of a panel with its three Gaussians, and the 2D model's own collapse.
+        figure, panel, fitted = new_figure(6.4, 4.2), panels[0].panel, panels[0].collapse
+        axes = figure.subplots()
+        quiet(axes, 'across the pass [mm]', 'film [µm]', 'One pass, eq. (3)')
+        x = np.linspace(-0.6, 0.6, 600) * fitted.reach_m
+        names = (r'at $+r_1$', r'at $-r_2$', 'centred')
+        for part, name, colour in zip(fitted.components_um(x), names, COMPONENTS, strict=True):
+            axes.plot(MM * x, part, color=colour, linewidth=1.3, linestyle='--', label=name)
+        total_um = fitted.thickness_um(x)
+        axes.plot(MM * x, total_um, color=INK, linewidth=2.0, label='sum of the three')
+        own = sampled_collapse(
+            calibration.model.painting_with(panel.brush), float(panel.speed_m_per_s[0]),
+            standoff_m=panel.distance_m, travel_rad=panel.travel_rad,
+        )  # fmt: skip
+        own_um = own.thickness_um(x)
+        axes.plot(MM * x, own_um, color=ACCENT, linewidth=1.6, label='2D model, collapsed')
+        axes.set_xlim(MM * x[0], MM * x[-1])
+        axes.set_ylim(bottom=0.0)
+        legend(axes, loc='upper right')
         written.append(save_picture(figure, folder / f'collapse.{suffix}'))
     figure = new_figure(5.2, 5.0)
     predicted_um = calibration.fit.predicted_um
     draw_agreement(figure.subplots(), study.measured_um, predicted_um, study.sigma_um)
     return [*written, save_picture(figure, folder / f'agreement.{suffix}')]
-
-
-def draw_collapse(axes: Axes, calibration: Calibration, one: PanelFit) -> None:
-    """Draw eq. (3) of a panel with its three Gaussians, and the 2D model's own collapse."""
-    quiet(axes, 'across the pass [mm]', 'film [µm]', 'One pass, eq. (3)')
-    fitted, panel = one.collapse, one.panel
-    x = np.linspace(-0.6, 0.6, LINE_POINTS) * fitted.reach_m
-    names = (r'at $+r_1$', r'at $-r_2$', 'centred')
-    for part, name, colour in zip(fitted.components_um(x), names, COMPONENTS, strict=True):
-        axes.plot(MM * x, part, color=colour, linewidth=1.3, linestyle='--', label=name)
-    axes.plot(MM * x, fitted.thickness_um(x), color=INK, linewidth=2.0, label='sum of the three')
-    own = sampled_collapse(
-        calibration.model.painting_with(panel.brush),
-        float(panel.speed_m_per_s[0]),
-        standoff_m=panel.distance_m,
-        travel_rad=panel.travel_rad,
-    )
-    axes.plot(
-        MM * x, own.thickness_um(x), color=ACCENT, linewidth=1.6, label='2D model, collapsed'
-    )
-    axes.set_xlim(MM * x[0], MM * x[-1])
-    axes.set_ylim(bottom=0.0)
-    legend(axes, loc='upper right')
 
 
 def draw_agreement(

@@ -118,15 +118,6 @@ def learned_rows(law: Effect | None) -> list[dict[str, str]]:
     return [dict(zip(('words', 'value', 'unit'), row, strict=True)) for row in rows]
 
 
-def law_lines(law: Effect | None) -> list[str]:
-    """A learned law in a line for its values and range, and in one for its closed forms."""
-    if not isinstance(law, LearnedLaw):
-        return []
-    shape = ', '.join(' '.join(row.values()).rstrip() for row in learned_rows(law))
-    forms = [form_words(law)] if isinstance(law, LearnedCurve) and law.sd else []
-    return [f'{effect_name(law.id)}: {shape}', *forms]
-
-
 def form_words(law: LearnedCurve) -> str:
     """The closed forms that fit a curve, with their values and probabilities, as sentences."""
     forms = [
