@@ -300,7 +300,7 @@ def place_command(
     """
     import numpy as np
 
-    from paint_deposition.api.planning import place
+    from paint_deposition.planning.part_places import part_places
 
     cell = robot_cell(robot, part_pose)
     if cell is None or part_pose is None:
@@ -313,7 +313,7 @@ def place_command(
     with progress('place') as show:
         show('reading')
         recorded = pd.read_recording(trajectory)
-        found = place(recorded, cell, x, y, free_roll, show)
+        found = part_places(recorded, cell, x, y, free_roll, show)
         results.write(found, made_from=inputs(trajectory=trajectory, urdf=robot['urdf']))
     lines = [found.sentence]
     if found.speed.max() > 0.0:
