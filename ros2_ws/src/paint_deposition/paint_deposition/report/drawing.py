@@ -77,6 +77,23 @@ class View:
         """(..., 2) where points (..., 3) lie in the picture [m]."""
         return np.stack([points_m @ self.right, points_m @ self.up], axis=-1)
 
+    def dress(
+        self, axes: Axes, low: np.ndarray | None = None, high: np.ndarray | None = None
+    ) -> None:
+        """Axes with the coordinates of the mesh, to these corners [m] if any."""
+        axes.set_aspect('equal', adjustable='datalim' if low is None else None)
+        if low is not None and high is not None:
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.spines[['top', 'right']].set_visible(False)
+        axes.tick_params(colors=MUTED, labelsize=9)
+        across, upward = self.labels
+        axes.set_xlabel(across, color=MUTED)
+        axes.set_ylabel(upward, color=MUTED, rotation=0, ha='right', va='center')
+        # Axes of the mesh that point the other way are labelled with the mesh's own sign.
+        for axis, direction in ((axes.xaxis, self.right), (axes.yaxis, self.up)):
+            if direction.min() < -SNAP_COSINE:
+                axis.set_major_formatter(lambda value, _: f'{0.0 - value:g}')
+
 
 def _snapped(direction: np.ndarray) -> np.ndarray:
     largest = np.abs(direction).argmax()
@@ -138,7 +155,7 @@ class PartPicture:
         height = min((PAGE_IN - 0.8) * upward / across, 4.2)
         figure = new_figure(PAGE_IN, height + 1.3)
         axes = figure.subplots()
-        self.dress(axes, low, high)
+        self.view.dress(axes, low, high)
         axes.set_title(title, loc='left', fontsize=TEXT_PT + 1.0, color=INK)
         return figure, axes
 
@@ -208,32 +225,12 @@ class PartPicture:
         """Visible creases and free edges."""
         axes.add_collection(LineCollection(list(self.edges_m), colors=INK, linewidths=0.8), False)
 
-    def dress(self, axes: Axes, low: np.ndarray, high: np.ndarray) -> None:
-        """Axes with the coordinates of the mesh, to these corners [m]."""
-        axes.set_aspect('equal')
-        axes.set_xlim(low[0], high[0])
-        axes.set_ylim(low[1], high[1])
-        dress(axes, self.view)
-
-
-def dress(axes: Axes, view: View) -> None:
-    """Axes with the coordinates of the mesh."""
-    axes.spines[['top', 'right']].set_visible(False)
-    axes.tick_params(colors=MUTED, labelsize=9)
-    across, upward = view.labels
-    axes.set_xlabel(across, color=MUTED)
-    axes.set_ylabel(upward, color=MUTED, rotation=0, ha='right', va='center')
-    # Axes of the mesh that point the other way are labelled with the mesh's own sign.
-    for axis, direction in ((axes.xaxis, view.right), (axes.yaxis, view.up)):
-        if direction.min() < -SNAP_COSINE:
-            axis.set_major_formatter(lambda value, _: f'{0.0 - value:g}')
-
 
 def draw_triangles(axes: Axes, corners_m: np.ndarray, rgba: np.ndarray) -> None:
     """Draw triangles (F, 3, 2) with colours (F, 3, 4) from 0 to 1 at their corners, in order."""
     x, y = corners_m.reshape(-1, 2).T
     triangles = Triangulation(x, y, np.arange(len(x)).reshape(-1, 3))
-    # Corners of pictures are set by ``dress``: to look for them takes longer than to draw.
+    # Corners of pictures are set by ``View.dress``: to look for them takes longer than to draw.
     axes.add_collection(
         TriMesh(triangles, facecolors=rgba.reshape(-1, 4), rasterized=True), autolim=False
     )

@@ -117,7 +117,7 @@ def draw_film(
     part = part or PartPicture.of(surface)
     scale = film_scale(film_um)
     low, high = part.window(spray)
-    part.dress(axes, low, high)
+    part.view.dress(axes, low, high)
     part.draw(axes, scale.rgba(film_um, film_um > painted_above_um))
     part.draw_contours(axes, film_um, scale.low, scale.high)
     draw_tool_path(axes, spray, part.view, low, high)
@@ -133,7 +133,7 @@ def _draw_band(
     zones: PointZones | None,
 ) -> None:
     low, high = part.window(spray)
-    part.dress(axes, low, high)
+    part.view.dress(axes, low, high)
     shares = part.zone_shares(zones) if zones else {}
     # The first lies below all others, so that no gap is left between smoothed borders.
     for below, number in enumerate(sorted(shares) or [-1]):

@@ -39,7 +39,6 @@ from paint_deposition.report.drawing import (
     View,
     colour_bar,
     draw_triangles,
-    dress,
     legend,
     new_figure,
     quiet,
@@ -186,11 +185,10 @@ def _draw_gun(axes: Axes, view: View, surface: Surface, spray: SprayPath, size_m
     places = view.flat(spray.position_m)
     low, high = places.min(axis=0) - 0.1 * size_m, places.max(axis=0) + 0.1 * size_m
     draw_tool_path(axes, spray, view, low, high)
-    axes.set_aspect('equal', adjustable='datalim')
     axes.margins(0.06)
     axes.grid(True, color=GRID, linewidth=0.8)
     axes.set_axisbelow(True)
-    dress(axes, view)
+    view.dress(axes)
 
 
 def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
@@ -209,7 +207,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     scale = _scale(result)
     films = zip(('before', 'after'), axes, (result.before, result.after), strict=True)
     for name, one, laid in films:
-        part.dress(one, low, high)
+        part.view.dress(one, low, high)
         part.draw(one, scale.rgba(laid.film_um, laid.film_um > 1.0))
         part.draw_zones(one, result.wanted.zones, laid.path)
         draw_tool_path(one, laid.path, part.view, low, high)

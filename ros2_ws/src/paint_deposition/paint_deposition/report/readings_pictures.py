@@ -263,7 +263,7 @@ def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = N
     """Draw the part, its film and its points on axes of your own, seen from the gun's side."""
     part = part or PartPicture.of(chosen.surface)
     scale = film_scale(chosen.film_um)
-    part.dress(axes, *part.window())
+    part.view.dress(axes, *part.window())
     part.draw(axes, scale.rgba(chosen.film_um, chosen.film_um > NO_PAINT_UM))
     part.draw_contours(axes, chosen.film_um, scale.low, scale.high)
     places = part.view.flat(chosen.positions_m)
