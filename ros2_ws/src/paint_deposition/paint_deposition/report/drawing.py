@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -258,9 +258,14 @@ def label_points(
         )  # fmt: skip
 
 
-def new_figure(width_in: float, height_in: float) -> Figure:
-    """An empty figure that draws into memory, without pyplot's global state."""
-    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout='constrained')
+def new_figure(
+    width_in: float, height_in: float, layout: Literal['constrained', 'none'] = 'constrained'
+) -> Figure:
+    """An empty figure that draws into memory, without pyplot's global state.
+
+    To lay many axes out takes as long as to draw them: with 'none' they are placed by hand.
+    """
+    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=layout)
     FigureCanvasAgg(figure)
     return figure
 

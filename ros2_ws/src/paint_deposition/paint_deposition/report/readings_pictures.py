@@ -105,7 +105,7 @@ def comparison_figure(data: ReportData) -> Figure:
         columns = count if count < 4 else 2
     rows = -(-count // columns)
     heights_in = (0.4, rows * PROFILE_IN[1])
-    figure = _free_figure(columns * PROFILE_IN[0], sum(heights_in))
+    figure = new_figure(columns * PROFILE_IN[0], sum(heights_in), 'none')
     above, below = figure.subfigures(2, 1, height_ratios=heights_in)
     places = below.subfigures(rows, columns, squeeze=False).ravel()
     for place, profile in zip(places, data.profiles, strict=False):
@@ -117,18 +117,11 @@ def comparison_figure(data: ReportData) -> Figure:
 
 def profile_figures(data: ReportData) -> tuple[list[Figure], list[tuple[str, str, str]]]:
     """A picture of each column or row; and words, colour and kind of mark of their legend."""
-    drawn = [_draw_profile(_free_figure(*PROFILE_IN), data, one) for one in data.profiles]
+    drawn = [_draw_profile(new_figure(*PROFILE_IN, 'none'), data, p) for p in data.profiles]
     kinds = ('bold' if line['width'] > 2.0 else 'line' for line in data.lines)
     models = zip(data.model_names, (line['color'] for line in data.lines), kinds, strict=True)
     measured = ('measured, bars: 95 % gauge and texture', INK, 'dot')
     return drawn, [measured, *models, ('each pass alone', BEFORE, 'dots')]
-
-
-def _free_figure(width_in: float, height_in: float) -> Figure:
-    """A figure whose axes are placed by hand: to lay so many out takes as long as to draw them."""
-    figure = new_figure(width_in, height_in)
-    figure.set_layout_engine('none')
-    return figure
 
 
 def _draw_profile(place: AnyFigure, data: ReportData, profile: Profile) -> AnyFigure:
