@@ -259,11 +259,11 @@ def label_points(
 
 
 def new_figure(
-    width_in: float, height_in: float, layout: Literal['constrained', 'none'] = 'constrained'
+    width_in: float, height_in: float, layout: Literal['constrained'] | None = 'constrained'
 ) -> Figure:
     """An empty figure that draws into memory, without pyplot's global state.
 
-    To lay many axes out takes as long as to draw them: with 'none' they are placed by hand.
+    To lay many axes out takes as long as to draw them: with None they are placed by hand.
     """
     figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=layout)
     FigureCanvasAgg(figure)

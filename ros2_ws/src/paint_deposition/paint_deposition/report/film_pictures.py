@@ -59,7 +59,7 @@ def film_picture(
     figure = new_figure(width + beside + around, rows * (max(height, 3.4) + around))
     grid = figure.add_gridspec(rows, 2, width_ratios=[width, beside])
     axes = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
-    scale = draw_film(axes[-1], surface, film_um, spray, statistics.painted_above_um, part)
+    scale = draw_film(axes[-1], part, film_um, spray, statistics.painted_above_um)
     bar = colour_bar(figure, axes[-1:], 'film [µm]', scale, aspect=25, pad=0.02)
     bar.ax.tick_params(colors=MUTED, labelsize=9)
     s, figures = statistics, figure.add_subplot(grid[rows - 1, 1])
@@ -103,18 +103,16 @@ def page_film(
 
 def draw_film(
     axes: Axes,
-    surface: Surface,
+    part: PartPicture,
     film_um: np.ndarray,
     spray: SprayPath,
     painted_above_um: float,
-    part: PartPicture | None = None,
 ) -> ColourScale:
     """Draw a painted part on axes of your own, seen from the gun's side.
 
     The colours, whose scale is returned, are the film (V,) [um] and relief is shown by lines
     alone; up to ``painted_above_um`` it is shown as bare metal.
     """
-    part = part or PartPicture.of(surface)
     scale = film_scale(film_um)
     low, high = part.window(spray)
     part.view.dress(axes, low, high)
