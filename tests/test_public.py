@@ -86,7 +86,7 @@ def test_what_is_no_result_is_refused(take, tmp_path):
 
 
 @pytest.mark.parametrize('which', ['film', 'comparison'])
-def test_a_result_is_a_table(which, request, tmp_path, monkeypatch):
+def test_a_result_is_a_table(which, request, tmp_path):
     """With the columns of its file."""
     result = request.getfixturevalue(which)
     pd.write(result, tmp_path)
@@ -96,16 +96,6 @@ def test_a_result_is_a_table(which, request, tmp_path, monkeypatch):
     assert tuple(columns) == written.dtype.names
     for key in ('x_m', 'thickness_um'):
         assert np.allclose(written[key], columns[key], rtol=1e-4, atol=1e-3), key
-    monkeypatch.setitem(sys.modules, 'pandas', None)
-    with pytest.raises(pd.PaintError, match=r'needs pandas, .*; run: pip install pandas'):
-        result.to_dataframe()
-
-
-def test_a_table_is_a_data_frame_of_pandas(film):
-    pytest.importorskip('pandas')
-    frame = film.to_dataframe()
-    assert list(frame.columns) == ['x_m', 'y_m', 'z_m', 'thickness_um']
-    assert (frame['thickness_um'].to_numpy() == film.film_um).all()
 
 
 @pytest.mark.slow

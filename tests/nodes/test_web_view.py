@@ -8,7 +8,7 @@ from nodes.cell import two_passes, write_panel
 from paint_deposition.nodes.node import WARN
 from paint_deposition.nodes.web_view import WebView
 from paint_deposition.report.colour_scales import film_scale
-from paint_deposition.report.live_page import STEP_UM, Page, Scene, Seen
+from paint_deposition.report.live_page import STEP_UM, Page, Scene
 
 # Of a vertex the colour that is drawn, without gun and passes in front of it.
 COLOUR = """(() => {
@@ -27,7 +27,7 @@ COLOUR = """(() => {
 
 def is_bare(scene: Scene) -> bool:
     """Whether a browser that comes now is sent no film."""
-    return not any(b'"kind": "film"' in message for message in scene.lacking(Seen()))
+    return not any(b'"kind": "film"' in message for message in next(scene.updates()))
 
 
 @pytest.fixture

@@ -13,13 +13,13 @@ from scipy.spatial.transform import Rotation
 import paint_deposition as pd
 import robot_arm
 from cli.command import paint
-from paint_deposition.api.planning import place, read_robot
+from paint_deposition.api.planning import read_robot
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.transforms import Rigid, at_part, moved
 from paint_deposition.planning.joints import JointPace, starts
-from paint_deposition.planning.part_places import PartPlaces
+from paint_deposition.planning.part_places import PartPlaces, part_places
 from paint_deposition.planning.plan import driven, plan
 from paint_deposition.planning.programme import Programme
 from paint_deposition.planning.requests import PlanRequest
@@ -191,12 +191,13 @@ def test_what_cannot_be_driven_says_where_and_a_robot_without_speeds_is_refused(
 
 
 def test_places_of_the_part_are_those_that_can_be_driven(planned, cell):
-    found = place(planned.trajectory, cell, [0.9, 5.0], [0.0])
+    found = part_places(planned.trajectory, cell, np.array([0.9, 5.0]), np.zeros(1))
     assert found.reached.tolist() == [[1.0, 0.0]]
     assert found.part_pose == pytest.approx(PART_POSE)
     assert found.speed[0, 0] > 0.5
     in_base = moved(planned.trajectory, cell.part, 'base_link')
-    assert place(in_base, cell, [0.9], [0.0]).room == pytest.approx(found.room[:, :1])
+    same = part_places(in_base, cell, np.array([0.9]), np.zeros(1))
+    assert same.room == pytest.approx(found.room[:, :1])
 
 
 def test_the_place_to_choose_has_good_neighbours(cell):

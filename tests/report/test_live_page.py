@@ -12,7 +12,7 @@ import paint_deposition as pd
 from chromium import CHROMIUM, Chromium
 from paint_deposition.api.replaying import Replay
 from paint_deposition.cli.main import run
-from paint_deposition.report.live_page import STEP_UM, Page, Scene, Seen
+from paint_deposition.report.live_page import STEP_UM, Page, Scene
 
 ARRAYS = {'float32': np.float32, 'uint32': np.uint32, 'uint16': np.uint16, 'uint8': np.uint8}
 
@@ -20,11 +20,11 @@ ARRAYS = {'float32': np.float32, 'uint32': np.uint32, 'uint16': np.uint16, 'uint
 class Onlooker:
     """What a browser makes of its messages."""
 
-    def __init__(self) -> None:
-        self.seen, self.film_um, self.rows, self.kinds = Seen(), np.empty(0), {}, []
+    def __init__(self, scene: Scene) -> None:
+        self.updates, self.film_um, self.rows, self.kinds = scene.updates(), np.empty(0), {}, []
 
-    def look(self, scene: Scene) -> 'Onlooker':
-        self.kinds = [self._take(message) for message in scene.lacking(self.seen)]
+    def look(self) -> 'Onlooker':
+        self.kinds = [self._take(message) for message in next(self.updates)]
         return self
 
     def _take(self, message: bytes) -> str:
@@ -75,7 +75,7 @@ def serve(scene):
 
 
 def test_only_what_changed_travels_and_whoever_comes_late_gets_all(scene, door):
-    early, late = Onlooker().look(scene), Onlooker()
+    early, late = Onlooker(scene).look(), Onlooker(scene)
     assert early.kinds == ['part']
     random = np.random.default_rng(4)
     film_um = np.zeros(len(door[0].vertices_m))
@@ -85,16 +85,16 @@ def test_only_what_changed_travels_and_whoever_comes_late_gets_all(scene, door):
         scene.show_film(film_um)
         scene.move_gun('', np.array([0.1 * step, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), step % 2)
         if step != 2:  # a slow link, on which nothing is lost
-            early.look(scene)
+            early.look()
             assert set(early.kinds) == {'film', 'guns', 'rows'}
-    assert early.look(scene).kinds == []
-    late.look(scene)
+    assert early.look().kinds == []
+    late.look()
     for onlooker in (early, late):
         np.testing.assert_allclose(onlooker.film_um, film_um, rtol=2**-11, atol=STEP_UM / 2)
         assert [row[4] for row in onlooker.rows['track']] == [0.0, 1.0, 0.0, 1.0]
     scene.begin_again()
-    assert early.look(scene).rows['track'] == []
-    assert early.look(scene).kinds == []
+    assert early.look().rows['track'] == []
+    assert early.look().kinds == []
 
 
 def test_a_run_is_painted_as_simulate_paints_it(door):
@@ -107,7 +107,7 @@ def test_a_run_is_painted_as_simulate_paints_it(door):
     replay.paint(Event())
     np.testing.assert_array_equal(shown[-1], film.film_um)
     assert not shown[0].any()
-    history = Onlooker().look(replay.scene).rows['history']
+    history = Onlooker(replay.scene).look().rows['history']
     assert history[-1][1:3] == pytest.approx([film.statistics.mean_um, film.statistics.std_dev_um])
     assert history[-1][6] == pytest.approx(film.statistics.within_target)
     assert np.all(np.diff([row[0] for row in history]) > 0.0)

@@ -55,22 +55,26 @@ def test_effects_without_a_docstring_and_learned_laws_are_told_by_what_they_have
     assert not words.is_learned('edge_build')
 
 
+def rows_of(law) -> list[tuple[str, ...]]:
+    return [tuple(row.values()) for row in words.learned_rows(law)]
+
+
 def test_a_learned_law_is_told_by_its_curve_and_its_range():
     law = LEARNED['time_s'](low=2.0, high=60.0, learned=(0.1, -0.25))
-    assert words.learned_words(law) == [('factor', '0.75 to 1.1', ''), ('over', '2 to 60', 's')]
+    assert rows_of(law) == [('factor', '0.75 to 1.1', ''), ('over', '2 to 60', 's')]
     passes = LEARNED['spray_pass'](low=0.0, high=5.0)
-    assert words.learned_words(passes)[1] == ('over', '1 to 6', '')
+    assert rows_of(passes)[1] == ('over', '1 to 6', '')
     fog = LEARNED['height_fraction'](kind='addition', learned=(2.0, -0.5))
-    assert words.learned_words(fog)[0] == ('addition', '−0.5 to 2', 'µm')
+    assert rows_of(fog)[0] == ('addition', '−0.5 to 2', 'µm')
     ends = {'low_m': (-0.5, -0.2), 'high_m': (0.5, 0.2)}
     grid = PartGrid(part_m=(1.2, 0.1, 0.5), **ends, columns=2, rows=2)
     map_ = LEARNED['place'](maps=(grid,), learned=(0.1, 0.0, 0.0, -0.2))
-    factor, over = words.learned_words(map_)
+    factor, over = rows_of(map_)
     assert factor == ('factor', '0.8 to 1.1', '')
     assert over == ('over', '1000 × 400', 'mm of a part')
     # Mean and first harmonic add up on the heavier side.
     ring = LEARNED['footprint'](reach_m=0.3, learned=(0.0,) * 5 + (0.1, 0.2, 0.0, 0.0, 0.0))
-    assert words.learned_words(ring)[0] == ('factor', '0.9 to 1.3', '')
+    assert rows_of(ring)[0] == ('factor', '0.9 to 1.3', '')
 
 
 KNOTS = 24
@@ -108,8 +112,8 @@ def test_a_curve_is_drawn_with_its_closed_form_and_with_its_band_if_it_is_known(
     assert high[-1] - low[0] == pytest.approx(2.0 * 1.96 * 0.02)
     # Far from the edge it is so wide that its lower end would take all film away.
     assert low[-1] == 0.05
-    words = [entry['words'] for entry in figure['legend']]
-    assert words == [*(entry['words'] for entry in plain['legend']), '95 % band']
+    words = [entry[0] for entry in figure['legend']]
+    assert words == [*(entry[0] for entry in plain['legend']), '95 % band']
 
 
 @pytest.mark.slow

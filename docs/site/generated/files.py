@@ -31,7 +31,6 @@ PART = set(OnePart.model_fields)
 # Keys that were explained before, in the order of the file.
 TARGET = ['target_um', 'tolerance_um']
 COAT = [k for k in campaign_coats.CoatEntry.model_fields if k not in MOTION | {'wet_on_wet'}]
-SWEPT = [key for key in SweepFile.model_fields if key in PART]
 BEGIN, END = '<!-- generated: files -->', '<!-- end of generated -->'
 MODEL = """
 A model has `planar` or `brushes` by their numbers, `projection`, a list of
@@ -66,8 +65,8 @@ def text() -> str:
         'Side by side, layers: ' + '; '.join(f'`{n}` {", ".join(w)}' for n, w in LAYERS.items()),
         f'\nLayouts known by their headings or lines: {"; ".join(layouts)}.\n',
         '## Sweep\n',
-        f'Also the keys of [a motion](#a-motion), and of [a part](#a-part) {_listed(SWEPT)}.\n',
-        _keys(SweepFile, without=MOTION.union(SWEPT)),
+        'Also the keys of [a motion](#a-motion) and of [a part](#a-part).\n',
+        _keys(SweepFile, without=MOTION.union(PART)),
         '### `passes`\n', _keys(Passes), '### `sample`\n', _keys(Sample),
     ])  # fmt: skip
 

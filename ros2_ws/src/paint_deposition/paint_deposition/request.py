@@ -120,8 +120,8 @@ class FilmBand(Request):
         return self
 
 
-class RobotArm(BaseModel):
-    """The robot and the ends of its chain."""
+class MotionOptions(BaseModel, extra='forbid'):
+    """What to read of a motion file, and where the part stands; None: not given."""
 
     urdf: Text | None = given(
         None, 'URDF of the robot whose joints the file has, or that is to drive the motion.'
@@ -134,20 +134,6 @@ class RobotArm(BaseModel):
         None, 'Link of the URDF for the frame of the poses; default: its root.',
         '--base --base-link',
     )  # fmt: skip
-
-
-class DrivingRobot(RobotArm):
-    """A robot that is to drive a motion."""
-
-    joint_acceleration: float | None = given(
-        None, 'Greatest acceleration of every joint of a robot that is to drive the motion '
-        '[rad/s2 or m/s2]; default: full speed in a quarter of a second.', above=0.0,
-    )  # fmt: skip
-
-
-class MotionOptions(RobotArm, extra='forbid'):
-    """What to read of a motion file, and where the part stands; None: not given."""
-
     pose_topic: Text | None = given(
         None, 'Topic of the poses in a bag; default: its only PoseStamped topic. With a URDF: '
         'joint states, several with blanks between them.',

@@ -17,14 +17,13 @@ from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.motion.programmed import timed
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
+from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.faces import PartPlan
 from paint_deposition.planning.faces import plan_faces as planned_faces
 from paint_deposition.planning.improvement import Improvement
-from paint_deposition.planning.part_places import PartPlaces, part_places
 from paint_deposition.planning.plan import Plan, driven, kept_clear, optimise
 from paint_deposition.planning.plan import plan as planned
 from paint_deposition.planning.planned_film import (
@@ -263,26 +262,3 @@ def read_robot(
             '<limit lower="-3" upper="3" effort="0" velocity="2"/>'
         )
     return RobotCell(arm, Rigid.of(part_pose), joint_acceleration)
-
-
-def place(
-    trajectory: Trajectory,
-    cell: RobotCell,
-    x_m: Sequence[float] | np.ndarray,
-    y_m: Sequence[float] | np.ndarray,
-    free_roll: bool = False,
-    progress: Progress = lambda what, share: None,
-) -> PartPlaces:
-    """Look where a part may stand so that the robot drives a motion over it.
-
-    Args:
-        trajectory: the motion, in the frame of the part, ``part`` or without a name, or in that of
-            the robot's base with the part at ``cell.part``.
-        cell: the robot, with height and turn of the part.
-        x_m, y_m: places of the part to try in the robot's base [m].
-        free_roll: the tool may be turned about its own axis, as where the pattern is round.
-        progress: called with what is being done and the share of it that is done, 0 to 1.
-    """
-    if not is_frame(trajectory.frame_id, 'part'):
-        trajectory = at_part(trajectory, cell.part.values, 'part')
-    return part_places(trajectory, cell, np.array(x_m), np.array(y_m), free_roll, progress)

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from paint_deposition.api.planning import plan
 from paint_deposition.api.simulation import simulate
 from paint_deposition.batch.cases import Case, code_digest, digest_of
@@ -37,7 +39,6 @@ from paint_deposition.part.surface import Surface
 NOTHING = 'nothing'
 # Columns that hold a list in each row: the film at every vertex, the gauge at every reading.
 PREDICTED = 'predicted_um'
-WARNINGS = 'warnings'
 
 
 @dataclass
@@ -81,6 +82,11 @@ class Job:
             digest = digest_of(code_digest(), model_digest(model), own, options, inputs)
             job.cases.append(Case(digest, {'model': model, **options}, inputs))
         return job
+
+    @property
+    def varied(self) -> list[str]:
+        """Names of what varies."""
+        return list(dict.fromkeys(name for values in self.values for name in values))
 
     def _named(self, key: str, values: Values) -> Path | None:
         name = values.get(key, getattr(self.file, key))
@@ -129,8 +135,12 @@ class Job:
         motion = self._named('trajectory', values)
         if mesh is None:
             raise BatchError('no mesh is given; give mesh')
-        how = (file.mesh_scale, file.max_edge_length_m, None, file.body)
-        surface = self._input('mesh', mesh, how, lambda: read_mesh(mesh, *how))
+        how = file.mesh_scale, file.max_edge_length_m
+        down = None if file.down is None else np.array(file.down)
+        surface = self._input(
+            'mesh', mesh, (*how, file.down, file.body),
+            lambda: read_mesh(mesh, *how, down, file.body),
+        )  # fmt: skip
         recorded = NOTHING
         if motion is not None:
             given = file.model_dump(include=set(MotionSource.model_fields))
@@ -166,8 +176,10 @@ class Job:
         return {
             'motion': {name: values[name] for name in MOTION_KEYS if name in values},
             'passes': passes if planned else {},
-            'target_um': file.target_um,
-            'tolerance_um': file.tolerance_um,
+            'film': {
+                name: getattr(file, name)
+                for name in ('target_um', 'tolerance_um', 'max_pose_gap_s')
+            },
         }
 
 
@@ -180,7 +192,7 @@ def computed(
     """The figures of a case, one row; a case without a film says why in the column ``error``.
 
     Args:
-        parameters: ``model``, ``motion``, ``passes``, ``target_um``, ``tolerance_um``.
+        parameters: ``model``, ``motion``, ``passes``, and ``film``, options of ``simulate``.
         surface: the part. trajectory: the motion; None: passes are planned.
         readings: places at which the gauge is predicted, or None.
     """
@@ -193,7 +205,7 @@ def computed(
             figures |= {'passes': len(planned.passes), 'cycle_time_s': planned.cycle_time_s}
         film = simulate(
             surface, varied_motion(trajectory, **parameters['motion']), model, readings=readings,
-            target_um=parameters['target_um'], tolerance_um=parameters['tolerance_um'],
+            **parameters['film'],
         )  # fmt: skip
     except PaintError as error:
         return {'error': [str(error)]}
@@ -203,7 +215,7 @@ def computed(
         'sigma_n': statistics.std_dev_um / statistics.mean_um if statistics.mean_um else None,
         'spraying_time_s': film.path.spraying_time_s,
         'film_sha256': hashlib.sha256(film.film_um.tobytes()).hexdigest(),
-        WARNINGS: '; '.join(film.warnings),
+        'warnings': '; '.join(film.warnings),
     }
     if film.predicted_um is not None:
         figures[PREDICTED] = film.predicted_um.tolist()

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paint_deposition.batch.cases import compute, workers
-from paint_deposition.batch.job import PREDICTED, WARNINGS, Job, computed
+from paint_deposition.batch.job import PREDICTED, Job, computed
 from paint_deposition.batch.sweep_file import DRAW, read_sweep
 from paint_deposition.errors import BatchError
 from paint_deposition.files.atomic import write_json, write_parquet
@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 
 # Shown for a case that leaves a value, or all of them, as in the sweep's file.
 UNCHANGED = 'unchanged'
-# The figure by which cases are ranked, less being better, and its label.
-SCORE, LABEL = 'sigma_n', 'unevenness σ_N'
+# By which cases are ranked, less being better; and all figures that are told, with their labels.
+SCORE = 'sigma_n'
+FIGURES = {SCORE: 'unevenness σ_N', 'mean_um': 'mean film [µm]'}
 
 
 def sweep(
@@ -72,7 +73,7 @@ def sweep(
         computed, job.cases, job.inputs, Path(folder) / 'finished', open_executor, progress
     )
     columns: dict[str, Any] = {'case': pa.array(range(1, len(job.cases) + 1))}
-    for name in dict.fromkeys(name for values in job.values for name in values):
+    for name in job.varied:
         column = [values.get(name) for values in job.values]
         if any(isinstance(value, list) for value in column):  # numbers and texts as they are
             column = [None if value is None else json.dumps(value) for value in column]
@@ -82,8 +83,8 @@ def sweep(
     if 'error' not in columns:
         columns['error'] = pa.nulls(len(job.cases), pa.string())
     found = Sweep(job, pa.table(columns), now)
-    if len(found.errors) == len(job.cases):
-        number, error = found.errors[0]
+    if len(errors := found.texts('error')) == len(job.cases):
+        number, error = errors[0]
         raise BatchError(f'none of {len(job.cases)} cases has a result; case {number}: {error}')
     return found
 
@@ -107,42 +108,21 @@ class Sweep:
     def _spread(self, name: str) -> list[float]:
         return np.nanquantile(self.column(name), (0.05, 0.5, 0.95)).tolist()
 
-    @property
-    def drawn(self) -> dict[str, str]:
-        """The figures that some case has, with their labels."""
-        charted = {SCORE: LABEL, 'mean_um': 'mean film [µm]'}
-        return {n: label for n, label in charted.items() if n in self.table.column_names}
-
-    @property
-    def varied(self) -> tuple[str, ...]:
-        """Names of what varied."""
-        return tuple(dict.fromkeys(name for values in self.job.values for name in values))
-
-    @property
-    def errors(self) -> list[tuple[int, str]]:
-        """Number of each case without a result, and why."""
-        return self._texts('error')
-
-    @property
-    def warnings(self) -> list[tuple[int, str]]:
-        """Number of each case with warnings, and the warnings."""
-        return self._texts(WARNINGS) if WARNINGS in self.table.column_names else []
-
-    def _texts(self, name: str) -> list[tuple[int, str]]:
+    def texts(self, name: str) -> list[tuple[int, str]]:
+        """Number of each case without a result, and why, by 'error'; or with 'warnings'."""
         texts = enumerate(self.table[name].to_pylist(), start=1)
         return [(number, text) for number, text in texts if text]
 
     @property
     def best(self) -> int | None:
         """Row of the most even film."""
-        if SCORE not in self.table.column_names or np.isnan(self.column(SCORE)).all():
-            return None
-        return int(np.nanargmin(self.column(SCORE)))
+        score = self.column(SCORE)
+        return None if np.isnan(score).all() else int(np.nanargmin(score))
 
     @property
     def sentence(self) -> str:
         """The sweep in a line."""
-        count, failed = len(self.job.cases), len(self.errors)
+        count, failed = len(self.job.cases), len(self.texts('error'))
         text = f'{count} cases, {self.computed} computed now, {count - self.computed} before'
         return f'{text}, {failed} without a result' if failed else text
 
@@ -150,14 +130,14 @@ class Sweep:
     def lines(self) -> Iterator[str]:
         """The result in lines."""
         yield self.sentence
-        for name, label in self.drawn.items():
+        for name, label in FIGURES.items():
             low, middle, high = self._spread(name)
             yield f'{label}: {middle:.4g}, 90 % of the cases {low:.4g} to {high:.4g}'
         if self.best is not None:
             values = self.job.values[self.best].items()
             texts = [f'{n} {f"{v:.6g}" if isinstance(v, float) else v}' for n, v in values]
             shown = ', '.join(texts) or UNCHANGED
-            yield f'best by {LABEL}: case {self.best + 1}, {shown}'
+            yield f'best by {FIGURES[SCORE]}: case {self.best + 1}, {shown}'
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``sweep.json``."""
@@ -165,14 +145,14 @@ class Sweep:
         return {
             'cases': len(self.job.cases),
             'computed': self.computed,
-            'varied': list(self.varied),
+            'varied': self.job.varied,
             'figures': {
                 name: dict(zip(('low_5', 'median', 'high_95'), self._spread(name), strict=True))
-                for name in self.drawn
+                for name in FIGURES
             },
             'judged_by': SCORE if best is not None else None,
             'best': None if best is None else {'case': best + 1, 'values': self.job.values[best]},
-            'errors': [{'case': number, 'error': error} for number, error in self.errors],
+            'errors': [{'case': number, 'error': error} for number, error in self.texts('error')],
             'notes': list(self.job.notes),
             'provenance': origin(files=self.job.files),
         }
@@ -188,9 +168,9 @@ def _write(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]:
         files.append(write_parquet(folder / 'points.parquet', _points(sweep)))
     files.append(folder / 'sweep.json')
     write_json(files[-1], sweep.to_dict())
-    over = {name: _axis_values(sweep, name) for name in sweep.varied if name != 'part_pose'}
-    if sweep.drawn and over:
-        results = {label: sweep.column(name) for name, label in sweep.drawn.items()}
+    over = {name: _axis_values(sweep, name) for name in sweep.job.varied if name != 'part_pose'}
+    if over:
+        results = {label: sweep.column(name) for name, label in FIGURES.items()}
         picture = folder / f'sweep.{pictures}'
         files.append(_write_picture(picture, over, results, sweep.sentence))
     return files

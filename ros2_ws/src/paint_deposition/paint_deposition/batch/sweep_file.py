@@ -21,7 +21,7 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.transforms import POSE_FORMAT, is_pose
-from paint_deposition.request import Number, Text, validate
+from paint_deposition.request import Number, OnePart, Text, validate
 
 INPUTS = ('mesh', 'trajectory', 'model')
 # Of passes that are planned, and of a recording as it was.
@@ -105,7 +105,7 @@ class Passes(BaseModel, extra='forbid'):
     one_way: bool = Field(False, description='whether all passes run one way')
 
 
-class SweepFile(MotionSource, extra='forbid'):
+class SweepFile(MotionSource, OnePart, extra='forbid'):
     """A sweep as it is written; paths are relative to the file."""
 
     mesh: Text | None = Field(None, description='the name of a mesh file')
@@ -114,8 +114,6 @@ class SweepFile(MotionSource, extra='forbid'):
     readings: Text | None = Field(
         None, description='the name of a file of points at which the gauge is predicted'
     )
-    mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
-    body: Text | None = Field(None, description='the name of the one body to take of the mesh')
     max_edge_length_m: Number = Field(0.02, gt=0.0, description='longest edge of the mesh [m]')
     target_um: Number = Field(0.0, ge=0.0, le=1e4, description='film wanted [um]')
     tolerance_um: Number = Field(0.0, ge=0.0, le=1e4, description='what it may differ [um]')

@@ -40,11 +40,12 @@ def _run(
     begins_with: Iterable[str] = ('model', 'posterior'),
     fitted: bool = True,
     words: str = '',
-) -> None:
+) -> Any:
     """Read a campaign and a model, compute, write, and say what came out.
 
     The ``verb`` takes of the model's file what it ``begins_with``, and ``lines`` put its result
-    into words. The line on the model says whether it was ``fitted``, or is ``words``.
+    into words; it is returned. The line on the model says whether it was ``fitted``, or is
+    ``words``.
     """
     with progress(command) as show:
         data = pd.read_campaign(
@@ -68,6 +69,7 @@ def _run(
     source = of_model if start else 'a 50 mm bell'
     begin = 'fitted to the campaign, from ' if fitted or start is None else ''
     results.print(said, words or begin + source, data.understood, warnings)
+    return result
 
 
 @click.command('calibrate')
@@ -129,7 +131,7 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
 @options.PART_POSE
 @options.ALLOW_EFFECTS
 @RESULTS
-def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
+def compare_command(model_files: tuple[Path, ...], **given: Any) -> pd.Comparison | pd.SideBySide:
     """Compare the model with the gauge readings of CAMPAIGN and show where it is off.
 
     Writes comparison.json, residuals.csv, comparison.png and report.html. With several models
@@ -137,8 +139,7 @@ def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
     """
     if len(model_files) < 2:
         given |= {'model_file': next(iter(model_files), None), 'begins_with': ['model']}
-        _run('compare', pd.compare, _comparison_lines, fitted=False, **given)
-        return
+        return _run('compare', pd.compare, _comparison_lines, fitted=False, **given)
     names = [file.stem for file in model_files]
     names = names if len(set(names)) == len(names) else [*map(str, model_files)]
     if twice := next((name for name in names if names.count(name) > 1), ''):
@@ -146,7 +147,7 @@ def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
     models = dict(zip(names, map(pd.read_model, model_files), strict=True))
     words, verb = ', '.join(map(str, model_files)), partial(pd.compare_models, models=models)
     given |= {'model_file': None, 'begins_with': [], 'words': words}
-    _run('compare', verb, _side_by_side_lines, **given)
+    return _run('compare', verb, _side_by_side_lines, **given)
 
 
 def _side_by_side_lines(beside: pd.SideBySide) -> Iterator[str]:
@@ -186,7 +187,7 @@ def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
 @options.PART_POSE
 @options.ALLOW_EFFECTS
 @RESULTS
-def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) -> None:
+def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) -> pd.Diagnosis:
     """Find out which physical effect the model of CAMPAIGN lacks, if any, and add it.
 
     Writes diagnosis.json, model.yaml with what was accepted, model_before.yaml without it,
@@ -195,7 +196,8 @@ def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) ->
     from paint_deposition.files.effect_file import load_effect_file
 
     own = [load_effect_file(file) for file in effect_files]
-    _run('diagnose', partial(pd.diagnose, own_effects=own, seed=seed), _diagnosis_lines, **given)
+    verb = partial(pd.diagnose, own_effects=own, seed=seed)
+    return _run('diagnose', verb, _diagnosis_lines, **given)
 
 
 @click.command('refit')
@@ -263,6 +265,7 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
 
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[str]:
+    from paint_deposition.effects.learned_curves import LearnedCurve
     from paint_deposition.report import words
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
@@ -272,8 +275,12 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[s
         label = how if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
         yield f'  {label}{effects.best}: {words.probability_words(effects)}{others}'
-        for line in words.law_lines(diagnosis.model.effect(effects.best)):
-            yield f'    {line}'
+        law = diagnosis.model.effect(effects.best)
+        if rows := words.learned_rows(law):
+            shape = ', '.join(' '.join(row.values()).rstrip() for row in rows)
+            yield f'    {words.effect_name(effects.best)}: {shape}'
+        if isinstance(law, LearnedCurve) and law.sd:
+            yield f'    {words.form_words(law)}'
         for name, value in effects.parameters.items():
             yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
     before, after = diagnosis.history[0], diagnosis.history[-1]

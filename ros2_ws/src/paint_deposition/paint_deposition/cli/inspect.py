@@ -65,15 +65,29 @@ def inspect_command(
     path = trajectory or recording
     if path is None or (trajectory and recording):
         raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
-    if part.mesh is not None:
-        if points_file:
-            raise click.UsageError('--points is for gauge readings; leave it or --mesh out')
-        made = _gun_on_part(part, path, motion, max_pose_gap_s, output, model_file)
-        (figures, lines), model = made
-        files = {'mesh': str(part.mesh), 'trajectory': str(path)}
-    else:
+    if part.mesh is None:
         model, files = None, {'recording': str(path)}
         figures, lines = _contents(path, points_file, part, motion, max_pose_gap_s)
+    elif points_file:
+        raise click.UsageError('--points is for gauge readings; leave it or --mesh out')
+    else:
+        with progress('inspect') as show:
+            show('reading')
+            recorded = pd.read_recording(path, **motion)
+            model = model_for(model_file, path)[0].model
+            seen = pd.look_at(part.surface(), recorded, model, max_pose_gap_s=max_pose_gap_s)
+            if output is not None:
+                from paint_deposition.report.plan_pictures import write_geometry_picture
+
+                show('drawing')
+                title = f'{path.name} over {part.mesh.name}'
+                write_geometry_picture(output, seen.surface, seen.path, seen.geometry, title)
+        print_all('note', seen.notes)
+        print_all('warning', [*seen.trajectory.warnings, *seen.geometry.warnings])
+        files = {'mesh': str(part.mesh), 'trajectory': str(path)}
+        told = {'mesh_file': str(part.mesh), 'trajectory': str(path), 'picture': output}
+        figures, lines = seen.to_dict() | told, [seen.geometry.sentence]
+        lines += [seen.geometry.facet_sentence, *([f'  {output}'] if output else [])]
     if as_json:  # the digests of long recordings take their time
         lines = [json_text(figures | {'provenance': origin(model, files)})]
     click.echo('\n'.join(lines))
@@ -266,35 +280,3 @@ def _stream_words(quality: StreamQuality) -> str:
         f'{quality.backward_stamps} backward stamps, {quality.repeated_samples} repeated '
         f'samples{without}{lag}'
     )
-
-
-def _gun_on_part(
-    part: options.Part,
-    path: Path,
-    motion: dict[str, Any],
-    max_pose_gap_s: float,
-    output: Path | None,
-    model_file: Path | None,
-) -> tuple[Contents, pd.DepositionModel]:
-    """How the gun ran over a part, drawn if a picture is wanted; what is odd goes to stderr.
-
-    And the model that says where its spray goes.
-    """
-    with progress('inspect') as show:
-        show('reading')
-        recorded = pd.read_recording(path, **motion)
-        model = model_for(model_file, path)[0].model
-        seen = pd.look_at(part.surface(), recorded, model, max_pose_gap_s=max_pose_gap_s)
-        if output is not None:
-            from paint_deposition.report.plan_pictures import write_geometry_picture
-
-            show('drawing')
-            title = f'{path.name} over {Path(str(part.mesh)).name}'
-            write_geometry_picture(output, seen.surface, seen.path, seen.geometry, title)
-    print_all('note', seen.notes)
-    print_all('warning', [*seen.trajectory.warnings, *seen.geometry.warnings])
-    figures = seen.to_dict() | {
-        'mesh_file': str(part.mesh), 'trajectory': str(path), 'picture': output,
-    }  # fmt: skip
-    lines = [seen.geometry.sentence, seen.geometry.facet_sentence]
-    return (figures, [*lines, *([f'  {output}'] if output else [])]), model

@@ -127,7 +127,9 @@ def run(arguments: list[str] | None = None) -> int:
     """Run a command and return its exit code."""
     exit_code = 2
     try:
-        return paint.main(args=arguments, prog_name='paint', standalone_mode=False) or 0
+        # The result of a command, or the code with which it has ended itself.
+        done = paint.main(args=arguments, prog_name='paint', standalone_mode=False)
+        return done if isinstance(done, int) else 0
     except PaintError as error:
         text = str(error)
     except click.ClickException as error:

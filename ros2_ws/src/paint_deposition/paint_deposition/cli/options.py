@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 
 import paint_deposition as pd
 from paint_deposition.errors import PaintError
-from paint_deposition.request import DrivingRobot, FilmBand, MotionOptions, OnePart, Request
+from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request
 
 Decorator = Callable[[Callable], Callable]
 
@@ -220,7 +220,15 @@ MAX_POSE_GAP = option_of(OnePart, 'max_pose_gap_s')
 motion_options = options_of(MotionOptions, 'motion', part_pose={'callback': _pose})
 none = {'show_default': 'none'}
 band_options = options_of(FilmBand, 'band', target_um=none, tolerance_um=none)
-robot_options = options_of(DrivingRobot, 'robot')
+JOINT_ACCELERATION = click.option(
+    '--joint-acceleration', type=POSITIVE,
+    help='Greatest acceleration of every joint of a robot that is to drive the motion [rad/s2 or '
+    'm/s2]; default: full speed in a quarter of a second.',
+)  # fmt: skip
+ROBOT = ('urdf', 'tip_link', 'base_link')
+robot_options = option_group(
+    [*(option_of(MotionOptions, name) for name in ROBOT), JOINT_ACCELERATION], 'robot'
+)
 
 
 def model_option(text: str = 'Deposition model, YAML; default: a 50 mm bell.') -> Decorator:

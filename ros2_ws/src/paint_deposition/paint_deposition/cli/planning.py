@@ -19,7 +19,7 @@ from paint_deposition.planning.requests import (
     IndexRequest,
     PlanRequest,
 )
-from paint_deposition.request import DrivingRobot, MotionOptions
+from paint_deposition.request import MotionOptions
 
 PAINT_MOVES = click.option(
     '--paint-moves', is_flag=True,
@@ -178,7 +178,7 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
 @options.seed_option('the models drawn from the posterior of the model file')
 @options.motion_options
 @PAINT_MOVES
-@options.option_of(DrivingRobot, 'joint_acceleration')
+@options.JOINT_ACCELERATION
 @options.ALLOW_EFFECTS
 @results_options('the bag, passes.csv, passes.mod, improvement.json, the picture and the film')
 def improve_command(
@@ -191,7 +191,7 @@ def improve_command(
     motion: dict[str, Any],
     joint_acceleration: float | None,
     results: Results,
-) -> None:
+) -> pd.Improvement:
     """Make the film of a given programme more even; its path stays as it is.
 
     Speeds along the passes, flows and the places where the gun opens and closes are chosen
@@ -203,7 +203,7 @@ def improve_command(
     with progress('improve') as show:
         show('reading')
         (file, of_model), part_pose = model_for(model_file, trajectory), motion['part_pose']
-        robot = {name: motion[name] for name in ('urdf', 'tip_link', 'base_link')}
+        robot = {name: motion[name] for name in options.ROBOT}
         limits = {'joint_acceleration': joint_acceleration}
         joints = holds_joints(trajectory)
         # Of recorded joints the URDF may be meant for reading them only.
@@ -228,6 +228,7 @@ def improve_command(
         )  # fmt: skip
     notes = (*result.surface.notes, *recorded.notes, *result.notes)
     results.print(_improvement_lines(result), of_model, notes, result.warnings)
+    return result
 
 
 def _improvement_lines(result: pd.Improvement) -> Iterator[str]:
@@ -293,7 +294,7 @@ def place_command(
     """
     import numpy as np
 
-    from paint_deposition.api.planning import place
+    from paint_deposition.planning.part_places import part_places
 
     cell = robot_cell(robot, part_pose)
     if cell is None or part_pose is None:
@@ -306,7 +307,7 @@ def place_command(
     with progress('place') as show:
         show('reading')
         recorded = pd.read_recording(trajectory)
-        found = place(recorded, cell, x, y, free_roll, show)
+        found = part_places(recorded, cell, x, y, free_roll, show)
         results.write(found, made_from=inputs(trajectory=trajectory, urdf=robot['urdf']))
     lines = [found.sentence]
     if found.speed.max() > 0.0:

@@ -19,7 +19,7 @@ from tqdm import tqdm
 import paint_deposition as pd
 from paint_deposition.cli.options import FOLDER, JSON, Decorator, option_group
 from paint_deposition.errors import PaintError
-from paint_deposition.files.atomic import locked, write_text
+from paint_deposition.files.atomic import write_text
 
 if TYPE_CHECKING:
     from paint_deposition.film.statistics import FilmStatistics
@@ -170,10 +170,12 @@ def results_in(folder: Path) -> Iterator[Path]:
     Raises:
         PaintError: what no command wrote has the name of a result, or lies among former results.
     """
+    from filelock import FileLock
+
     folder = folder.resolve()
-    # The temporary folder of this machine: a lock beside the results would stay there.
+    # In the temporary folder of this machine, since its file stays.
     key = hashlib.sha256(f'{Path.home()} {folder}'.encode()).hexdigest()[:16]
-    with locked(Path(tempfile.gettempdir()) / f'paint-{key}.lock'):
+    with FileLock(Path(tempfile.gettempdir()) / f'paint-{key}.lock', mode=0o600):
         names = (f'.{folder.name}.paint_{what}' for what in ('work', 'former'))
         work, former = map(folder.with_name, names)
         _put_right(folder, work, former)

@@ -15,13 +15,12 @@ from importlib import metadata
 from itertools import groupby
 from pathlib import Path
 from textwrap import TextWrapper
-from typing import Any
 
 import click
 
 import paint_deposition as pd
 from paint_deposition.cli.options import FOLDER, JSON
-from paint_deposition.cli.results import python, results_in
+from paint_deposition.cli.results import python
 
 
 @click.command('demo')
@@ -36,88 +35,37 @@ from paint_deposition.cli.results import python, results_in
 def demo_command(output: Path, opens: bool) -> None:
     """Paint a sample door, find what the model lacks by its readings, plan a better door.
 
-    The page that opens at the end tells it with pictures.
+    These are four commands on sample files. The page that opens at the end tells it with pictures.
     """
+    from paint_deposition.cli.main import paint
+    from paint_deposition.report.page import write_story
+
     samples = pd.sample_folder() / 'measured_door'
-    mesh, recording, unseen = (samples / name for name in ('door.stl', 'door', 'unseen.yaml'))
-    campaign = samples / 'campaign.yaml'
-    state = '/atomizer/state'
-    motion = ('--mesh', mesh, '--trajectory', recording, '--state-topic', state)
+    part = '--mesh', samples / 'door.stl'
+    motion = *part, '--trajectory', samples / 'door', '--state-topic', '/atomizer/state'
     models = [output / 'diagnosis' / f'{name}.yaml' for name in ('model_before', 'model')]
-    told = _Told(output)
-
-    told.begin('Painting a door', 'film', 'simulate', *motion)
-    from paint_deposition.files.model_file import read_model_file
-    from paint_deposition.report import page
-    from paint_deposition.report.data import ReportData
-
-    told.step('reading mesh and recording; the first run also compiles')
-    trajectory = pd.read_recording(recording, state_topic=state)
-    film = pd.simulate(pd.read_mesh(mesh, max_edge_length_m=0.01), trajectory, progress=told.step)
-    told.end(film, page.film_figures(film))
-
-    told.begin('Diagnosing its readings', 'diagnosis', 'diagnose', campaign)
-    found = pd.diagnose(pd.read_campaign(campaign), progress=told.step)
-    told.end(found, page.key_figures(ReportData(found)))
-
-    given = [word for model in models for word in ('--model', model)]
-    told.begin('Comparing with readings that no fit has seen', 'unseen', 'compare', unseen, *given)
-    beside = pd.compare_models(
-        pd.read_campaign(unseen), {path.stem: pd.read_model(path) for path in models},
-        progress=told.step,
-    )  # fmt: skip
-    told.end(beside, page.unseen_figures(beside))
-
-    told.begin('Planning the next door', 'improved', 'improve', *motion, '--model', models[1])
-    better = read_model_file(models[1])
-    improved = pd.improve(
-        pd.read_mesh(mesh, max_edge_length_m=0.02), trajectory, better.model,
-        posterior=better.posterior, progress=told.step,
-    )  # fmt: skip
-    told.end(improved, page.improvement_figures(improved))
-
+    steps = {
+        'film': ('simulate', *motion),
+        'diagnosis': ('diagnose', samples / 'campaign.yaml'),
+        'unseen': ('compare', samples / 'unseen.yaml', '--model', models[0], '--model', models[1]),
+        'improved': ('improve', *motion, '--model', models[1]),
+    }
+    results, told = [], {}
+    for folder, words in steps.items():
+        given = [*map(str, words), '-o', str(output / folder)]
+        told[given[0]] = f'paint {shlex.join(given)}'
+        click.echo(f'$ {told[given[0]]}')
+        results.append(paint.main(given, prog_name='paint', standalone_mode=False))
+        click.echo()
     # What the simulator that made the samples has hidden in them: their campaign.yaml says how.
-    hidden, to = 'incidence_attraction', output / 'demo.html'
-    path = page.write_story(to, film, found, beside, improved, hidden, told.commands)
-    click.echo(f'\nThe story with pictures: {path}')
+    hidden, page = 'incidence_attraction', output / 'demo.html'
+    film, found, beside, improved = results
+    write_story(page, film, found, beside, improved, hidden, told)
+    click.echo(f'The story with pictures: {page}')
     # Where a browser has somewhere to show a page.
     desktop = sys.platform in ('darwin', 'win32')
     if opens and (desktop or any(os.environ.get(n) for n in ('DISPLAY', 'WAYLAND_DISPLAY'))):
-        webbrowser.open(path.resolve().as_uri())
-
-
-class _Told:
-    """What is being done, on the terminal, piped or not.
-
-    Attributes:
-        commands: that do the same by hand, by their names.
-    """
-
-    def __init__(self, output: Path) -> None:
-        self.commands: dict[str, str] = {}
-        self._output, self._folder, self._step = output, output, ''
-        self._began_s = time.monotonic()
-
-    def begin(self, what: str, folder: str, *command: object) -> None:
-        """Say what comes next, and the command that writes the same to its folder."""
-        self._folder = self._output / folder
-        words = shlex.join(map(str, [*command, '-o', self._folder]))
-        self.commands[str(command[0])] = f'paint {words}'
-        click.echo(f'\n{what}\n  $ paint {words}')
-
-    def step(self, what: str, share: float | None = None) -> None:
-        """Say what is being done, once."""
-        if what != self._step:
-            self._step = what
-            click.echo(f'  {time.monotonic() - self._began_s:3.0f} s  {what}')
-
-    def end(self, result: Any, figures: list[tuple[str, str, str, str]]) -> None:
-        """Write a result, and say its figures."""
-        self.step('writing and drawing')
-        with results_in(self._folder) as folder:
-            pd.write(result, folder)
-        for label, before, after, unit in figures:
-            click.echo(f'  {label + ":":32} {before + " -> " if before else ""}{after} {unit}')
+        webbrowser.open(page.resolve().as_uri())
 
 
 # Mean film on the painted share of the sample panel [µm].
@@ -142,7 +90,7 @@ def doctor_command(as_json: bool) -> None:
         f'{platform.platform(terse=True)} {platform.machine()}'
     )
     findings: list[Finding] = [('paint', versions, None, '')]
-    for look in (_libraries, _ros, _processor, _rapid, _known_film):
+    for look in (_libraries, _ros, _processor, _known_film):
         try:
             findings += look()
         except Exception as error:  # noqa: PERF203 (whatever a broken installation raises)
@@ -174,6 +122,8 @@ def _libraries() -> Iterator[Finding]:
     """Versions of what the package and its extras ask for, and which are missing or too old."""
     from packaging.requirements import Requirement
 
+    from paint_deposition.files.rapid.parser import parse_modules
+
     wanted = map(Requirement, metadata.requires('paint_deposition') or [])
     for marker, needed in groupby(wanted, lambda one: str(one.marker or '')):
         if 'test' in marker:
@@ -188,6 +138,8 @@ def _libraries() -> Iterator[Finding]:
         # A marker is that of an extra: extra == "many".
         name, ok = (f'extra {marker[10:-1]}', None) if marker else ('libraries', not unfit)
         yield name, ', '.join(found), ok, remedy
+    # The package lark-parser puts another lark in the place of the one that is asked for.
+    parse_modules('MODULE Try\n  PROC main()\n    PaintL p1, v100;\n  ENDPROC\nENDMODULE', 'Try')
 
 
 def _ros() -> Iterator[Finding]:
@@ -213,26 +165,13 @@ def _processor() -> Iterator[Finding]:
     import numba
 
     from paint_deposition.kernel.compiler import KIND
-    from paint_deposition.part.face_tree import box_distance
 
     has = llvm.get_host_cpu_features()
     named = ('sse4.2', 'avx', 'avx2', 'fma', 'avx512f', 'neon', 'sve')
     features = ' '.join(name for name in named if has.get(name))
     threads = f'{numba.get_num_threads()} threads on {os.cpu_count()} processors'
-    yield 'processor', f'{llvm.get_host_cpu_name()}, {features}; {threads}', None, ''
-    folder = Path(box_distance.stats.cache_path)
-    folder = Path(pd.__file__).parent if folder.name == '__pycache__' else folder.parent
-    sizes = [file.stat().st_size for file in folder.rglob('*.nb[ic]')]
-    found = f'for {KIND}: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}'
-    yield 'compiled code', found, None, ''
-
-
-def _rapid() -> Iterator[Finding]:
-    from paint_deposition.files.rapid.parser import parse_modules
-
-    # The package lark-parser puts another lark in the place of the one that is asked for.
-    parse_modules('MODULE Try\n  PROC main()\n    PaintL p1, v100;\n  ENDPROC\nENDMODULE', 'Try')
-    yield 'RAPID', 'a program is read', True, ''
+    found = f'{llvm.get_host_cpu_name()}, {features}; {threads}; code compiled for {KIND}'
+    yield 'processor', found, None, ''
 
 
 def _known_film() -> Iterator[Finding]:

@@ -80,7 +80,7 @@ def simulate_command(
     max_pose_gap_s: float,
     band: FilmBand,
     results: Results,
-) -> None:
+) -> pd.Film:
     """Compute the film on a part from a recorded trajectory.
 
     film.csv and film.ply hold the film at the vertices of the refined mesh, and that of each coat.
@@ -116,6 +116,7 @@ def simulate_command(
     notes = (*film.notes, *([readings.understood] if readings else []))
     words = '; '.join(dict.fromkeys(of_model for _, of_model in chosen))
     results.print(_film_lines(film), words, notes, film.warnings)
+    return film
 
 
 def _film_lines(film: pd.Film) -> Iterator[str]:
@@ -191,7 +192,7 @@ def sweep_command(sweep: Path, results: Results, scheduler: str | None, count: i
         results.write(found)
     # Each reason once, with the first of its cases.
     named: dict[str, list[int]] = {}
-    for number, reason in (*found.errors, *found.warnings):
+    for number, reason in (*found.texts('error'), *found.texts('warnings')):
         named.setdefault(reason, []).append(number)
     warnings = [
         f'case {first}{f" and {len(others)} more" if others else ""}: {reason}'

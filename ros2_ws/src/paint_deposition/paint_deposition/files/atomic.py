@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -154,29 +153,6 @@ def replacing(path: str | Path) -> Iterator[Path]:
             _sync(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
-
-
-@contextmanager
-def locked(lock: Path) -> Iterator[None]:
-    """Wait until no other process holds the lock of this path; its file goes with the lock."""
-    if sys.platform == 'win32':
-        from filelock import FileLock  # there it removes its file itself
-
-        with FileLock(lock):
-            yield
-        return
-    import fcntl
-
-    while True:
-        with open(lock, 'a', opener=lambda f, how: os.open(f, how | os.O_NOFOLLOW, 0o600)) as file:
-            fcntl.flock(file, fcntl.LOCK_EX)
-            if not os.fstat(file.fileno()).st_nlink:  # its last holder has removed it meanwhile
-                continue
-            try:
-                yield
-            finally:
-                lock.unlink(missing_ok=True)  # while it is held: who waits for it makes another
-            return
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -21,7 +21,6 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import Zones
-from paint_deposition.tabular import Tabular
 
 if TYPE_CHECKING:
     from paint_deposition.inference.readings.readings import Readings
@@ -73,7 +72,7 @@ class GunOnPart:
 
 
 @dataclass(frozen=True)
-class Film(Tabular):
+class Film:
     """The film on a part, with all that it was computed from.
 
     Attributes:

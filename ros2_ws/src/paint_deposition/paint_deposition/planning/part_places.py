@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import PlanError, RecordingError
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.transforms import Rigid
+from paint_deposition.motion.transforms import Rigid, at_part, is_frame
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.joints import fastest_way, ways_of
 
@@ -141,13 +141,23 @@ def part_places(
     free_roll: bool = False,
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> PartPlaces:
-    """Try a motion, in the part's frame, with the part at each place of a grid.
+    """Look where a part may stand so that the robot drives a motion over it.
 
-    ``cell.part`` gives the height and the turn of the part. Accelerations are not looked at.
+    Accelerations are not looked at.
+
+    Args:
+        trajectory: the motion, in the frame of the part, ``part`` or without a name, or in that of
+            the robot's base with the part at ``cell.part``.
+        cell: the robot, with height and turn of the part.
+        x_m, y_m: places of the part to try in the robot's base, (K,) and (I,) [m].
+        free_roll: the tool may be turned about its own axis, as where the pattern is round.
+        progress: called with what is being done and the share of it that is done, 0 to 1.
 
     Raises:
         PlanError: the grid is empty.
     """
+    if not is_frame(trajectory.frame_id, 'part'):
+        trajectory = at_part(trajectory, cell.part.values, 'part')
     if not len(x_m) or not len(y_m):
         raise PlanError('the grid of places is empty; give FROM TO with FROM below TO')
     arm, shape = cell.arm, (len(y_m), len(x_m))

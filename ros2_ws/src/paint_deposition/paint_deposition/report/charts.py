@@ -18,7 +18,6 @@ from paint_deposition.report.colour_scales import (
     ACCENT,
     BEFORE,
     COOLWARM,
-    GRID,
     INK,
     MUTED,
     TWO_SIDED_95,
@@ -47,40 +46,22 @@ def _figure(
     The legend of all of them has for each entry words, colour and the kind of mark: 'line',
     'bold', 'dot' or 'band'.
     """
-    keys = ('words', 'colour', 'kind')
-    entries = [dict(zip(keys, entry, strict=True)) for entry in legend]
-    return {'name': name, 'charts': list(charts), 'legend': entries} if charts else None
+    return {'name': name, 'charts': charts, 'legend': legend} if charts else None
 
 
 def _chart(
     title: str, traces: list[dict], x: dict, y: dict, height: int, **more: Any
 ) -> dict[str, Any]:
-    """A chart with these axes, quiet, on the page's own background and in its font.
+    """A chart with these axes, in the style of the page.
 
     The page sets the title as text, so that it wraps on a narrow one.
     """
-    layout = {
-        'font': {
-            'family': 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif',
-            'size': 12, 'color': INK,
-        },
-        'paper_bgcolor': CLEAR, 'plot_bgcolor': CLEAR,
-        'margin': {'l': 48, 'r': 12, 't': 8, 'b': 44},
-        'showlegend': False,
-        'modebar': {'bgcolor': CLEAR, 'color': BEFORE, 'activecolor': ACCENT},
-        'xaxis': x, 'yaxis': y, 'height': height,
-    }  # fmt: skip
+    layout = {'xaxis': x, 'yaxis': y, 'height': height}
     return {'title': title, 'data': traces, 'layout': layout | more}
 
 
 def _axis(title: str, **more: Any) -> dict[str, Any]:
-    """An axis with a thin grid and an outward tick."""
-    return {
-        'title': {'text': title, 'font': {'size': 12, 'color': MUTED}, 'standoff': 6},
-        'gridcolor': GRID, 'zeroline': False, 'zerolinecolor': MUTED, 'zerolinewidth': 1,
-        'linecolor': BEFORE, 'showline': True, 'ticks': 'outside', 'ticklen': 4,
-        'tickcolor': BEFORE, 'tickfont': {'size': 11, 'color': MUTED}, 'automargin': True,
-    } | more  # fmt: skip
+    return {'title': {'text': title}} | more
 
 
 def _line(x: np.ndarray, y: np.ndarray, colour: str, width: float, **more: Any) -> dict[str, Any]:

@@ -10,31 +10,22 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
-from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedLaw, LearnedMap
+from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedMap
 from paint_deposition.film.common_film import sum_um
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import wanted_at
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.profiles import Profile, profiles_of
+from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.readings import root_mean_square
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.report import words
 from paint_deposition.report.colour_scales import ACCENT, BEFORE, INK, MODELS, TWO_SIDED_95
-
-# What a parameter of the pattern is called: symbol, meaning, unit.
-SYMBOLS = {
-    'K1_cm3_per_s': ('K1', 'deposited solids rate', 'cm³/s'),
-    'K2': ('K2', 'weight of the centred Gaussian', ''),
-    'K3': ('K3', 'asymmetry of the ring', ''),
-    'phi_rad': ('φ', 'phase of the asymmetry', '°'),
-    'r_m': ('r', 'radius of the ring', 'mm'),
-    'sigma1_m': ('σ1', 'width of the ring', 'mm'),
-    'sigma2_m': ('σ2', 'width of the centred Gaussian', 'mm'),
-}
 
 
 class ReportData:
@@ -45,7 +36,7 @@ class ReportData:
             of models side by side each.
         diagnosis: None after a comparison alone.
         older: history of the model that a diagnosis started from, as in its file.
-        names: of models that stand side by side; none where one model followed from another.
+        beside: models that stand side by side; None where one followed from another.
         models: base first, best last. model: the best one.
         improved: whether there is a before and an after.
         model_names: what the models are called where both are shown.
@@ -62,12 +53,11 @@ class ReportData:
         older: Sequence[Mapping[str, Any]] = (),
     ) -> None:
         self.older = older
-        self.names: tuple[str, ...] = ()
+        self.beside = result if isinstance(result, SideBySide) else None
         self.diagnosis: Diagnosis | None = None
         self.comparisons: tuple[Comparison, ...]
         self.proposals: tuple[Sequence[Place], Sequence[Spray]] = ((), ())
         if isinstance(result, SideBySide):
-            self.names = tuple(result.by_name)
             self.comparisons = tuple(result.by_name.values())
         elif isinstance(result, Comparison):
             self.comparisons = (result,)
@@ -80,14 +70,15 @@ class ReportData:
         self.models = tuple(comparison.model for comparison in self.comparisons)
         self.residuals_um = [comparison.points.residual_um for comparison in self.comparisons]
         self.model, count = self.models[-1], len(self.models)
-        self.improved = count > 1 and not self.names
-        self.model_names: tuple[str, ...] = self.names or ('model',)
+        self.improved = count > 1 and not self.beside
+        self.model_names: tuple[str, ...] = ('model',)
         self.colours: tuple[str, ...] = MODELS[:count]
         self.lines: list[dict[str, Any]] = [{'color': ACCENT, 'width': 3.5}]
         if self.improved:
             self.model_names, self.colours = ('model before', 'model after'), (BEFORE, ACCENT)
             self.lines.insert(0, {'color': INK, 'width': 1.2})
-        elif self.names:
+        elif self.beside:
+            self.model_names = tuple(self.beside.by_name)
             self.lines = [{'color': colour, 'width': 2.2} for colour in self.colours]
 
     @cached_property
@@ -204,14 +195,18 @@ def class_rows(data: ReportData) -> list[dict[str, Any]]:
         parameters = [
             _parameter(effect, name, *astuple(value)) for name, value in found.parameters.items()
         ]
+        accepted = data.diagnosis is not None and found.best in data.diagnosis.accepted
+        learned, sure = words.is_learned(found.best), found.probability > SURE
         rows.append({
             'id': found.best, 'found': found, 'name': words.effect_name(found.best),
-            'learned': words.is_learned(found.best),
             'like': like, 'others': [words.effect_name(member) for member in like],
-            'accepted': data.diagnosis is not None and found.best in data.diagnosis.accepted,
+            'accepted': accepted, 'learned': learned,
+            # A diagnosis adds effects that it is sure of, and keeps learned laws for what they
+            # predict: others were added by the user.
+            'asked': accepted and not (found.probability == 1.0 if learned else sure),
             'meaning': words.effect_meaning(effect),
             'signature': effect.signature if effect else '',
-            'parameters': parameters + _learned(data.model.effect(found.best)),
+            'parameters': parameters + words.learned_rows(data.model.effect(found.best)),
         })  # fmt: skip
     return rows
 
@@ -219,19 +214,14 @@ def class_rows(data: ReportData) -> list[dict[str, Any]]:
 def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[str, str]:
     """A parameter in words: its value, and the ends of its 95 % interval if there is one."""
     unit = effect.parameters()[name]['unit'] if effect else ''
+    return {'words': words.parameter_words(name, unit)} | _printed(unit, *values)
+
+
+def _printed(unit: str, *values: float) -> dict[str, str]:
     # A value below this share of its interval is printed as none.
     if abs(values[0]) < 1e-4 * np.ptp(values):
         values = (0.0, *values[1:])
-    printed = zip(('unit', 'value', 'low', 'high'), words.in_unit(unit, *values), strict=False)
-    return {'words': words.parameter_words(name, unit)} | dict(printed)
-
-
-def _learned(effect: Effect | None) -> list[dict[str, str]]:
-    """The curve and the range of a learned law; nothing for other effects."""
-    if not isinstance(effect, LearnedLaw):
-        return []
-    keys = ('words', 'value', 'unit')
-    return [dict(zip(keys, row, strict=True)) for row in words.learned_words(effect)]
+    return dict(zip(('unit', 'value', 'low', 'high'), words.in_unit(unit, *values), strict=False))
 
 
 def law_rows(data: ReportData) -> list[dict[str, str]]:
@@ -244,8 +234,8 @@ def law_rows(data: ReportData) -> list[dict[str, str]]:
         elif isinstance(law, LearnedFootprint):
             rows.append(row | {'kind': 'footprint', 'ends': words.number(1e3 * law.reach_m)})
         elif isinstance(law, LearnedCurve):
-            _, ends, unit = words.learned_words(law)[1]
-            row |= {'kind': 'curve', 'ends': ends, 'unit': unit}
+            over = words.learned_rows(law)[1]
+            row |= {'kind': 'curve', 'ends': over['value'], 'unit': over['unit']}
             if law.sd:  # where the band of the curve is narrow, and where it is wide
                 at = np.linspace(law.low, law.high, 101)
                 half, shown = TWO_SIDED_95 * law.deviation(at), counted_from_1(law.covariate, at)
@@ -267,14 +257,12 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     brushes, rows = data.model.brushes, []
     of = [f'brush {brush.number}: ' if len(brushes) > 1 else '' for brush in brushes] or ['']
     for (whose, planar), name in product(zip(of, data.model.patterns, strict=True), PATTERN_NAMES):
-        symbol, meaning, unit = SYMBOLS[name]
-        factor = {'mm': 1e3, '°': float(np.degrees(1.0))}.get(unit, 1.0)
-        value = words.number(factor * getattr(planar, name), 4)
-        row = {'symbol': symbol, 'words': whose + meaning, 'unit': unit, 'value': value}
-        if name in found:
-            ends = (words.number(factor * end) for end in (found[name].low, found[name].high))
-            row['interval'] = ' to '.join(ends)
-        rows.append(row)
+        # 'r, offset radius of the ring [m]'
+        symbol, _, described = str(PlanarPattern.model_fields[name].description).partition(', ')
+        meaning, _, unit = described.removesuffix(']').partition(' [')
+        ends = (found[name].low, found[name].high) if name in found else ()
+        told = {'symbol': symbol, 'words': whose + meaning}
+        rows.append(told | _printed(unit, getattr(planar, name), *ends))
     return rows
 
 
@@ -284,7 +272,7 @@ def effect_rows(data: ReportData) -> list[dict[str, Any]]:
     rows = []
     for effect in data.model.effects:
         found = known.get(effect.id, {})
-        parameters = _learned(effect)
+        parameters = words.learned_rows(effect)
         for name in effect.parameters():
             values = astuple(found[name]) if name in found else [getattr(effect, name)]
             parameters.append(_parameter(type(effect), name, *values))

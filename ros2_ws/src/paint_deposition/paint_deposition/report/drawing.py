@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -77,6 +77,23 @@ class View:
         """(..., 2) where points (..., 3) lie in the picture [m]."""
         return np.stack([points_m @ self.right, points_m @ self.up], axis=-1)
 
+    def dress(
+        self, axes: Axes, low: np.ndarray | None = None, high: np.ndarray | None = None
+    ) -> None:
+        """Axes with the coordinates of the mesh, to these corners [m] if any."""
+        axes.set_aspect('equal', adjustable='datalim' if low is None else None)
+        if low is not None and high is not None:
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.spines[['top', 'right']].set_visible(False)
+        axes.tick_params(colors=MUTED, labelsize=9)
+        across, upward = self.labels
+        axes.set_xlabel(across, color=MUTED)
+        axes.set_ylabel(upward, color=MUTED, rotation=0, ha='right', va='center')
+        # Axes of the mesh that point the other way are labelled with the mesh's own sign.
+        for axis, direction in ((axes.xaxis, self.right), (axes.yaxis, self.up)):
+            if direction.min() < -SNAP_COSINE:
+                axis.set_major_formatter(lambda value, _: f'{0.0 - value:g}')
+
 
 def _snapped(direction: np.ndarray) -> np.ndarray:
     largest = np.abs(direction).argmax()
@@ -138,35 +155,14 @@ class PartPicture:
         height = min((PAGE_IN - 0.8) * upward / across, 4.2)
         figure = new_figure(PAGE_IN, height + 1.3)
         axes = figure.subplots()
-        self.dress(axes, low, high)
+        self.view.dress(axes, low, high)
         axes.set_title(title, loc='left', fontsize=TEXT_PT + 1.0, color=INK)
         return figure, axes
 
     def draw(self, axes: Axes, rgba: np.ndarray) -> None:
         """The part in colours of its vertices, (V, 4) uint8: no light falls on them."""
         draw_triangles(axes, self.flat_m[self.faces], rgba[self.faces] / 255.0)
-        self._draw_edges(axes)
-
-    def draw_bands(
-        self,
-        axes: Axes,
-        film_um: np.ndarray,
-        ends_um: list[float],
-        colours: list[str],
-        within: np.ndarray | None = None,
-    ) -> None:
-        """The part with a colour for each band of the film, (V,) at the vertices [um].
-
-        Where ``within`` (V,) is below a half it is left out; default: nowhere.
-        """
-        triangles = self._triangles()
-        least, most = min(film_um.min(), ends_um[0]), max(film_um.max(), ends_um[-1])
-        levels = [least - 1.0, *ends_um, most + 1.0]
-        bands = axes.tricontourf(triangles, film_um, levels, colors=colours)
-        if within is not None:
-            outline = axes.tricontourf(triangles, within, [0.5, 2.0], alpha=0.0)
-            bands.set_clip_path(outline.get_paths()[0], axes.transData)
-        self._draw_edges(axes)
+        self.draw_edges(axes)
 
     def zone_shares(self, zones: Zones) -> dict[int, np.ndarray]:
         """(V,) 1 in each zone and 0 outside, smoothed: its border is at a half, not by triangles.
@@ -194,7 +190,7 @@ class PartPicture:
         for number, share in self.zone_shares(zones).items():
             if number < 0:
                 continue
-            axes.tricontour(self._triangles(), share, [0.5], colors=INK, linewidths=1.4)
+            axes.tricontour(self.triangles(), share, [0.5], colors=INK, linewidths=1.4)
             own = share[self.faces[self.seen]].mean(axis=1) > 0.5
             if not own.any():
                 continue
@@ -208,7 +204,7 @@ class PartPicture:
                 zorder=5, path_effects=PALE_HALO,
             )  # fmt: skip
 
-    def _triangles(self) -> Triangulation:
+    def triangles(self) -> Triangulation:
         """The triangles that are seen."""
         return Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
 
@@ -219,41 +215,22 @@ class PartPicture:
         if not len(levels) or not self.seen.any():
             return
         lines = axes.tricontour(
-            self._triangles(), film_um, levels, colors=INK, linewidths=0.6, alpha=0.55
+            self.triangles(), film_um, levels, colors=INK, linewidths=0.6, alpha=0.55
         )
         for label in axes.clabel(lines, fontsize=7.5, fmt='%g', inline_spacing=3):
             # Level, or labels on upright lines would read upward here and downward there.
             label.set(path_effects=PALE_HALO, rotation=0.0, transform_rotates_text=False)
 
-    def _draw_edges(self, axes: Axes) -> None:
+    def draw_edges(self, axes: Axes) -> None:
+        """Visible creases and free edges."""
         axes.add_collection(LineCollection(list(self.edges_m), colors=INK, linewidths=0.8), False)
-
-    def dress(self, axes: Axes, low: np.ndarray, high: np.ndarray) -> None:
-        """Axes with the coordinates of the mesh, to these corners [m]."""
-        axes.set_aspect('equal')
-        axes.set_xlim(low[0], high[0])
-        axes.set_ylim(low[1], high[1])
-        dress(axes, self.view)
-
-
-def dress(axes: Axes, view: View) -> None:
-    """Axes with the coordinates of the mesh."""
-    axes.spines[['top', 'right']].set_visible(False)
-    axes.tick_params(colors=MUTED, labelsize=9)
-    across, upward = view.labels
-    axes.set_xlabel(across, color=MUTED)
-    axes.set_ylabel(upward, color=MUTED, rotation=0, ha='right', va='center')
-    # Axes of the mesh that point the other way are labelled with the mesh's own sign.
-    for axis, direction in ((axes.xaxis, view.right), (axes.yaxis, view.up)):
-        if direction.min() < -SNAP_COSINE:
-            axis.set_major_formatter(lambda value, _: f'{0.0 - value:g}')
 
 
 def draw_triangles(axes: Axes, corners_m: np.ndarray, rgba: np.ndarray) -> None:
     """Draw triangles (F, 3, 2) with colours (F, 3, 4) from 0 to 1 at their corners, in order."""
     x, y = corners_m.reshape(-1, 2).T
     triangles = Triangulation(x, y, np.arange(len(x)).reshape(-1, 3))
-    # Corners of pictures are set by ``dress``: to look for them takes longer than to draw.
+    # Corners of pictures are set by ``View.dress``: to look for them takes longer than to draw.
     axes.add_collection(
         TriMesh(triangles, facecolors=rgba.reshape(-1, 4), rasterized=True), autolim=False
     )
@@ -281,9 +258,14 @@ def label_points(
         )  # fmt: skip
 
 
-def new_figure(width_in: float, height_in: float) -> Figure:
-    """An empty figure that draws into memory, without pyplot's global state."""
-    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout='constrained')
+def new_figure(
+    width_in: float, height_in: float, layout: Literal['constrained'] | None = 'constrained'
+) -> Figure:
+    """An empty figure that draws into memory, without pyplot's global state.
+
+    To lay many axes out takes as long as to draw them: with None they are placed by hand.
+    """
+    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=layout)
     FigureCanvasAgg(figure)
     return figure
 

@@ -60,7 +60,7 @@ def film_picture(
     figure = new_figure(width + beside + around, rows * (max(height, 3.4) + around))
     grid = figure.add_gridspec(rows, 2, width_ratios=[width, beside])
     axes = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
-    scale = draw_film(axes[-1], surface, film_um, spray, statistics.painted_above_um, part)
+    scale = draw_film(axes[-1], part, film_um, spray, statistics.painted_above_um)
     bar = colour_bar(figure, axes[-1:], 'film [µm]', scale, aspect=25, pad=0.02)
     bar.ax.tick_params(colors=MUTED, labelsize=9)
     s, figures = statistics, figure.add_subplot(grid[rows - 1, 1])
@@ -104,21 +104,19 @@ def page_film(
 
 def draw_film(
     axes: Axes,
-    surface: Surface,
+    part: PartPicture,
     film_um: np.ndarray,
     spray: SprayPath,
     painted_above_um: float,
-    part: PartPicture | None = None,
 ) -> ColourScale:
     """Draw a painted part on axes of your own, seen from the gun's side.
 
     The colours, whose scale is returned, are the film (V,) [um] and relief is shown by lines
     alone; up to ``painted_above_um`` it is shown as bare metal.
     """
-    part = part or PartPicture.of(surface)
     scale = film_scale(film_um)
     low, high = part.window(spray)
-    part.dress(axes, low, high)
+    part.view.dress(axes, low, high)
     part.draw(axes, scale.rgba(film_um, film_um > painted_above_um))
     part.draw_contours(axes, film_um, scale.low, scale.high)
     draw_tool_path(axes, spray, part.view, low, high)
@@ -134,7 +132,7 @@ def _draw_band(
     zones: Zones | None,
 ) -> None:
     low, high = part.window(spray)
-    part.dress(axes, low, high)
+    part.view.dress(axes, low, high)
     shares = part.zone_shares(zones) if zones else {}
     # The first lies below all others, so that no gap is left between smoothed borders.
     for below, number in enumerate(sorted(shares) or [-1]):
@@ -146,7 +144,13 @@ def _draw_band(
                 ends.append(end)
                 colours.append(colour)
         colours.append(HIGH if wanted.target_um else GRID)
-        part.draw_bands(axes, film_um, ends, colours, shares[number] if below else None)
+        least, most = min(film_um.min(), ends[0]) - 1.0, max(film_um.max(), ends[-1]) + 1.0
+        levels = [least, *ends, most]
+        bands = axes.tricontourf(part.triangles(), film_um, levels, colors=colours)
+        if below:
+            outline = axes.tricontourf(part.triangles(), shares[number], [0.5, 2.0], alpha=0.0)
+            bands.set_clip_path(outline.get_paths()[0], axes.transData)
+        part.draw_edges(axes)
     part.draw_zones(axes, zones, spray)
     draw_tool_path(axes, spray, part.view, low, high)
 

@@ -2,13 +2,11 @@
 
 import asyncio
 import hmac
-import itertools
 import json
 import math
 import secrets
 import socket
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
@@ -48,16 +46,6 @@ def frame(kind: str, arrays: Arrays = None, **values: Any) -> bytes:
     return b''.join(
         [len(head).to_bytes(4, 'little'), head, *(a.tobytes() for a in arrays.values())]
     )
-
-
-@dataclass
-class Seen:
-    """What one browser has been sent."""
-
-    blocks: dict[str, bytes] = field(default_factory=dict)
-    film: np.ndarray = field(default_factory=lambda: np.empty(0, np.uint16))
-    # Of each series the list itself, since another one may take its place, and how much of it.
-    rows: dict[str, tuple[list[Sequence[float]], int]] = field(default_factory=dict)
 
 
 class Scene:
@@ -137,28 +125,32 @@ class Scene:
             self._shown[name] = shown
             self._blocks['guns'] = frame('guns', guns=list(self._shown.values()))
 
-    def lacking(self, seen: Seen) -> list[bytes]:
-        """The messages that bring a browser up to date; it counts as having seen them."""
-        with self._lock:
-            blocks, film = dict(self._blocks), self._film
-            rows = {series: (kept, len(kept)) for series, kept in self._rows.items()}
-        frames = [block for kind, block in blocks.items() if seen.blocks.get(kind) != block]
-        if seen.blocks.get('part') != blocks.get('part'):
-            seen.film = np.zeros(len(film), np.uint16)
-        seen.blocks = blocks
-        changed = film != seen.film
-        if changed.any():
-            mask = np.packbits(changed, bitorder='little')
-            frames.append(frame('film', {'changed': mask, 'um': film[changed]}))
-            seen.film = film
-        for series, (kept, count) in rows.items():
-            had, sent = seen.rows.get(series, (kept, 0))
-            first = sent if had is kept else 0
-            if had is not kept or count > first:
-                new = np.array(kept[first:count], np.float32)
-                frames.append(frame('rows', {'rows': new}, series=series, first=first))
-            seen.rows[series] = kept, count
-        return frames
+    def updates(self) -> Iterator[list[bytes]]:
+        """For one browser: again and again, the messages that bring it up to date."""
+        # What it has been sent; of each series the list itself, since another one may take its
+        # place, and how much of it.
+        seen: dict[str, bytes] = {}
+        seen_film: np.ndarray = np.empty(0, np.uint16)
+        seen_rows: dict[str, tuple[list[Sequence[float]], int]] = {}
+        while True:
+            with self._lock:
+                blocks, film = dict(self._blocks), self._film
+                rows = {series: (kept, len(kept)) for series, kept in self._rows.items()}
+            frames = [block for kind, block in blocks.items() if seen.get(kind) != block]
+            if seen.get('part') != blocks.get('part'):
+                seen_film = np.zeros(len(film), np.uint16)
+            changed = film != seen_film
+            if changed.any():
+                mask = np.packbits(changed, bitorder='little')
+                frames.append(frame('film', {'changed': mask, 'um': film[changed]}))
+            for series, (kept, count) in rows.items():
+                had, sent = seen_rows.get(series, (kept, 0))
+                first = sent if had is kept else 0
+                if had is not kept or count > first:
+                    new = np.array(kept[first:count], np.float32)
+                    frames.append(frame('rows', {'rows': new}, series=series, first=first))
+            seen, seen_film, seen_rows = blocks, film, rows
+            yield frames
 
     def _append(self, series: str, row: Sequence[float]) -> None:
         rows = self._rows[series]
@@ -293,10 +285,8 @@ class _Browser(_Guarded, WebSocketHandler):
         self._sending.cancel()
 
     async def _send(self) -> None:
-        seen = Seen()
         try:
-            for turn in itertools.count():
-                frames = self.page.scene.lacking(seen)
+            for turn, frames in enumerate(self.page.scene.updates()):
                 # A page that hears nothing for some seconds takes the server to be gone.
                 if turn % 10 == 0:
                     frames.append(frame('alive'))

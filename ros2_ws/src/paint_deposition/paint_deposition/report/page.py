@@ -6,7 +6,6 @@ from base64 import b64encode
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from io import BytesIO
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.planning.improvement import Improvement
-from paint_deposition.planning.planned_film import LaidFilm
 from paint_deposition.report import charts, words
 from paint_deposition.report.colour_scales import TWO_SIDED_95, film_scale
 from paint_deposition.report.data import (
@@ -45,8 +43,6 @@ from paint_deposition.report.readings_pictures import (
 )
 
 TEMPLATES = Path(__file__).parent / 'templates'
-# A figure of a page: label, before or '', after, unit or remark.
-Row = tuple[str, str, str, str]
 FILTERS: dict[str, Callable[..., Any]] = {
     'um': words.fixed,
     'signed': lambda value: words.fixed(value, signed=True),
@@ -82,12 +78,11 @@ def report_html(data: ReportData) -> str:
     profiles, profile_legend = profile_figures(data)
     later = {(m.experiment, m.kind, m.label): m for m in data.comparisons[-1].misfits}
     # What the tables begin with: the model before, or of models side by side the last.
-    shown = data.comparisons[-1 if data.names else 0]
+    shown = data.comparisons[-1 if data.beside else 0]
     zone_films = {row['name']: row['film'].zones for row in films}
     return _filled(
         'report.html.j2',
         **_verdict(data),
-        key_figures=key_figures(data),
         head=list(data.study.campaign.head.items()),
         film=films,
         zones=[(z, zone_films[z.experiment][z.name]) for z in data.comparisons[-1].zones],
@@ -102,7 +97,7 @@ def report_html(data: ReportData) -> str:
             for m in shown.misfits
         ],
         shown=shown,
-        of_model=f', {data.names[-1]}' if data.names else '',
+        of_model=f', {data.model_names[-1]}' if data.beside else '',
         history=history_as_list(data.study, diagnosis.history, data.older) if diagnosis else [],
         notes=(diagnosis or data.study).notes,
         lined=all(len(profile.line_m) for profile in data.profiles),
@@ -127,7 +122,7 @@ def write_story(
     improved: Improvement,
     hidden: str,
     commands: Mapping[str, str],
-) -> Path:
+) -> None:
     """Write the page of `paint demo`, whole or not at all.
 
     Args:
@@ -148,14 +143,11 @@ def write_story(
     page = _filled(
         'story.html.j2', **_verdict(data), model_file='diagnosis/model.yaml', gun=film.guns[0],
         unseen=unseen, improved=improved, hidden=hidden, commands=commands,
-        key_figures=key_figures(data),
-        film_figures=film_figures(film), unseen_figures=unseen_figures(unseen),
-        improvement_figures=improvement_figures(improved), painted=_embedded(painted),
+        film=film.statistics, painted=_embedded(painted),
         residuals=list(map(_embedded, residuals)),
         programmes=list(map(_embedded, improved_figures(improved))),
     )  # fmt: skip
     write_text(path, page)
-    return path
 
 
 def film_rows(data: ReportData) -> list[dict[str, Any]]:
@@ -222,104 +214,12 @@ def _embedded(figure: Figure) -> str:
 
 def _verdict(data: ReportData) -> dict[str, Any]:
     """What ``templates/verdict.j2`` puts into words for the engineer who runs the process."""
-    diagnosis, rows = data.diagnosis, class_rows(data)
-    added = [row for row in rows if row['accepted']]
-    kind = 'side_by_side' if data.names else 'compared'
-    if diagnosis:
-        # A diagnosis adds effects that it is sure of, and keeps learned laws for what they
-        # predict: others were added by the user.
-        asked = any(
-            row['found'].probability < 1.0 if row['learned'] else row['found'].probability <= SURE
-            for row in added
-        )
-        kind = 'asked_for' if asked else diagnosis.verdict
     points, freedom = data.comparisons[-1].points, min(data.study.noise.degrees_of_freedom, 1e6)
-    history = diagnosis.history if diagnosis else (None,)
-    errors = dict(zip(data.names, (c.points.rmse_um for c in data.comparisons), strict=False))
+    targets = [data.study.campaign.target_of(experiment) for experiment in data.experiments]
     return {
-        'data': data, 'd': diagnosis, 'kind': kind, 'counts': words.count_words(data.study),
-        'classes': rows, 'added': added, 'open': [row for row in rows if not row['accepted']],
-        'named': [row for row in added if not row['learned']],
-        'laws': [row for row in added if row['learned']],
-        'first': history[0], 'last': history[-1], 'steps': list(pairwise(history)),
-        'least': min((row['found'].probability for row in added), default=1.0),
-        'best': min(errors, key=lambda name: errors[name], default=''),
-        'tolerance_um': min(
-            (t for _, t in map(data.study.campaign.target_of, data.experiments) if t), default=0.0
-        ),
-        'sprays': data.proposals[1], 'SURE': SURE, 'ALPHA': ALPHA,
+        'data': data, 'd': data.diagnosis, 'counts': words.count_words(data.study),
+        'classes': class_rows(data), 'sprays': data.proposals[1], 'SURE': SURE, 'ALPHA': ALPHA,
+        'tolerance_um': min((tolerance for _, tolerance in targets if tolerance), default=0.0),
         # Deviations so large come from the gauge alone in 1 % of cases.
         'beyond_chance': fdtrc(len(points), freedom, points.chi_square_per_reading) < 0.01,
     }  # fmt: skip
-
-
-def key_figures(data: ReportData) -> list[Row]:
-    """The figures beside the verdict."""
-    noise, diagnosis = data.study.noise, data.diagnosis
-    source = {'stated': 'as stated', 'assumed': 'assumed'}.get(
-        noise.source, f'from {noise.source}'
-    )
-    floor = ('Gauge and texture', '', f'{data.study.noise_floor_um:.2f}', f'µm, {source}')
-    if diagnosis is None:
-        labels = [f'Error, {name}' for name in data.names] or ['Error']
-        return [
-            *(
-                (label, '', f'{found.points.rmse_um:.2f}', 'µm RMS at the points')
-                for label, found in zip(labels, data.comparisons, strict=True)
-            ),
-            floor,
-        ]
-    first, last = diagnosis.history[0], diagnosis.history[-1]
-    rows = []
-    for label, name in (
-        (f'Error on {diagnosis.left_out} held out', 'holdout_rmse_um'),
-        ('Error at fitted points', 'rmse_um'),
-    ):
-        before = f'{getattr(first, name):.2f}' if first is not last else ''
-        rows.append((label, before, f'{getattr(last, name):.2f}', 'µm RMS'))
-    rows.append(floor)
-    open_too = diagnosis.verdict == 'undecided'
-    for best in diagnosis.classes:
-        if not words.is_learned(best.best) and (open_too or best.best in diagnosis.accepted):
-            remark = 'probability' + (', with its like' if len(best.members) > 1 else '')
-            return [*rows, (words.effect_name(best.best), '', percent(best.probability), remark)]
-    return rows
-
-
-def film_figures(film: Film) -> list[Row]:
-    """The film of the demo."""
-    s = film.statistics
-    return [
-        ('Film', '', f'{s.mean_um:.1f}', 'µm on average'),
-        ('Least and greatest', '', f'{s.min_um:.1f} to {s.max_um:.1f}', 'µm'),
-        (
-            'Caught by the door',
-            '',
-            f'{100 * s.capture_fraction:.0f}',
-            '% of what a flat panel would get (not the transfer efficiency)',
-        ),
-    ]
-
-
-def unseen_figures(unseen: SideBySide) -> list[Row]:
-    """The errors of both models of the demo on readings that no fit has seen."""
-    before, after = (words.fixed(one.points.rmse_um) for one in unseen.by_name.values())
-    count = len(unseen.by_name[unseen.best].readings)
-    return [(f'RMSE, {count} unseen readings', before, after, 'µm')]
-
-
-def improvement_figures(found: Improvement) -> list[Row]:
-    """A programme before and after, in the film that the model predicts."""
-
-    def both(label: str, unit: str, digits: int, figure: Callable[[LaidFilm], float]) -> Row:
-        before, after = (words.fixed(figure(of), digits) for of in (found.before, found.after))
-        return label, before, after, unit
-
-    more = 100.0 * (found.after.paint.emitted_cm3 / found.before.paint.emitted_cm3 - 1.0)
-    return [
-        both('Standard deviation', '% of the mean', 1, lambda f: 100 * f.sigma_n),
-        both('Area', f'% within {found.band}', 0, lambda f: 100 * f.within),
-        both('Least film', 'µm', 1, lambda f: f.statistics.min_um),
-        ('Paint sprayed', '', words.fixed(more, 0, signed=True), '%'),
-        both('Time', 's', 1, lambda f: f.cycle_time_s),
-    ]

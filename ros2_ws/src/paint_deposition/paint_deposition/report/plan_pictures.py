@@ -23,7 +23,6 @@ from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.colour_scales import (
     ACCENT,
     BEFORE,
-    COMPONENTS,
     GRID,
     INK,
     MUTED,
@@ -33,12 +32,12 @@ from paint_deposition.report.colour_scales import (
     film_scale,
 )
 from paint_deposition.report.drawing import (
+    HALO,
     MM,
     PartPicture,
     View,
     colour_bar,
     draw_triangles,
-    dress,
     legend,
     new_figure,
     quiet,
@@ -48,7 +47,6 @@ from paint_deposition.report.film_pictures import draw_tool_path, page_film
 
 CHOSEN = '#c0392b'
 PART_COLOUR = '#b8c2cc'
-PASS_COLOURS = (ACCENT, *COMPONENTS, CHOSEN, '#2c5aa0')
 
 
 def write_uniformity(path: str | Path, recommendation: Recommendation) -> Path:
@@ -135,12 +133,11 @@ def write_geometry_picture(
     key = figure.add_subplot(grid[1, 1])
     key.set_axis_off()
     lines = [
-        Line2D([], [], color=PASS_COLOURS[0], linewidth=1.8, label='gun on, a colour a pass'),
-        Line2D([], [], color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)), label='gun off'),
-        Line2D(
-            [], [], color=PASS_COLOURS[0], linewidth=0.9, marker='.', markersize=4,
-            markerfacecolor=INK, label='tool z from the TCP (the dot is its tip)',
-        ),
+        Line2D([], [], color='white', linewidth=1.7, path_effects=HALO,
+               label='gun on, with the number of the pass'),
+        Line2D([], [], color=INK, linewidth=0.9, linestyle=(0, (3, 3)), label='gun off'),
+        Line2D([], [], color=ACCENT, linewidth=0.9, marker='.', markersize=4, markerfacecolor=INK,
+               label='tool z from the TCP (the dot is its tip)'),
         Line2D([], [], color=PART_COLOUR, linewidth=6, label='the part'),
     ]  # fmt: skip
     key.legend(handles=lines, loc='upper left', frameon=False, fontsize=9, labelcolor=INK)
@@ -158,49 +155,8 @@ def _ratios(one: float, other: float) -> tuple[float, float]:
 
 
 def _draw_gun(axes: Axes, view: View, surface: Surface, spray: SprayPath, size_m: float) -> None:
-    _draw_part(axes, view, surface, size_m)
-    on = spray.flow > 0.0
-    colours = [PASS_COLOURS[n % len(PASS_COLOURS)] for n in np.maximum(spray.spray_pass, 0)]
-    breaks = 1 + np.flatnonzero((on[1:] != on[:-1]) | (np.diff(spray.spray_pass) != 0))
-    numbered = set()
-    for rows in np.split(np.arange(len(spray)), breaks):
-        line = view.flat(spray.position_m[rows])
-        if not on[rows[0]]:
-            axes.plot(*line.T, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
-            continue
-        axes.plot(*line.T, color=colours[rows[0]], linewidth=1.8)
-        number = int(spray.spray_pass[rows[0]])
-        if number not in numbered and len(rows) > 1:
-            numbered.add(number)
-            axes.annotate(
-                str(number + 1), line[0], fontsize=7.5, color='white', ha='center', va='center',
-                bbox={'boxstyle': 'circle,pad=0.2', 'facecolor': colours[rows[0]], 'linewidth': 0},
-            )  # fmt: skip
-    # Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
-    travel, apart_m = np.cumsum(spray.dwell_s * spray.speed_m_per_s), 0.04 * size_m
-    evenly_m = np.arange(0.5 * apart_m, travel[-1], apart_m)
-    shown = np.unique(np.searchsorted(travel, evenly_m))
-    start = spray.position_m[shown]
-    ends = start + 0.09 * size_m * spray.rotation[shown, :, 2]
-    axes.add_collection(
-        LineCollection(
-            list(np.stack([view.flat(start), view.flat(ends)], axis=1)), linewidths=0.9,
-            colors=[colours[row] if on[row] else '#c5ccd3' for row in shown],
-        )
-    )  # fmt: skip
-    axes.plot(*view.flat(ends).T, linestyle='', marker='.', markersize=2.5, color=INK)
-    axes.set_aspect('equal', adjustable='datalim')
-    axes.margins(0.06)
-    axes.grid(True, color=GRID, linewidth=0.8)
-    axes.set_axisbelow(True)
-    dress(axes, view)
-
-
-def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:
-    normals = face_normals(surface.vertices_m, surface.faces)
-    toward = normals @ view.toward
-    depth = surface.vertices_m[surface.faces].mean(axis=1) @ view.toward
-    order = np.argsort(depth)
+    toward = face_normals(surface.vertices_m, surface.faces) @ view.toward
+    order = np.argsort(surface.vertices_m[surface.faces].mean(axis=1) @ view.toward)
     # The back of a sheet is seen from some sides: it is darker.
     light = np.where(toward >= 0.0, 0.75 + 0.25 * toward, 0.6)[order]
     colours = np.array(to_rgba(PART_COLOUR)) * np.column_stack([light] * 3 + [np.ones(len(light))])
@@ -215,6 +171,23 @@ def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:
             color=INK,
         )  # fmt: skip
     axes.update_datalim(flat)
+    # Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
+    travel, apart_m = np.cumsum(spray.dwell_s * spray.speed_m_per_s), 0.04 * size_m
+    evenly_m = np.arange(0.5 * apart_m, travel[-1], apart_m)
+    shown = np.unique(np.searchsorted(travel, evenly_m))
+    start = spray.position_m[shown]
+    ends = start + 0.09 * size_m * spray.rotation[shown, :, 2]
+    lines = np.stack([view.flat(start), view.flat(ends)], axis=1)
+    colours = np.where(spray.flow[shown] > 0.0, ACCENT, '#c5ccd3')
+    axes.add_collection(LineCollection(list(lines), linewidths=0.9, colors=colours))
+    axes.plot(*view.flat(ends).T, linestyle='', marker='.', markersize=2.5, color=INK)
+    places = view.flat(spray.position_m)
+    low, high = places.min(axis=0) - 0.1 * size_m, places.max(axis=0) + 0.1 * size_m
+    draw_tool_path(axes, spray, view, low, high)
+    axes.margins(0.06)
+    axes.grid(True, color=GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    view.dress(axes)
 
 
 def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
@@ -233,7 +206,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     scale = _scale(result)
     films = zip(('before', 'after'), axes, (result.before, result.after), strict=True)
     for name, one, laid in films:
-        part.dress(one, low, high)
+        part.view.dress(one, low, high)
         part.draw(one, scale.rgba(laid.film_um, laid.film_um > 1.0))
         part.draw_zones(one, result.wanted.zones, laid.path)
         draw_tool_path(one, laid.path, part.view, low, high)

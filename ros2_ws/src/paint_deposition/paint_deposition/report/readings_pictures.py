@@ -15,7 +15,6 @@ from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.regions import interpolation_matrix
 from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration
-from paint_deposition.inference.fitting.panel import PanelFit
 from paint_deposition.report.colour_scales import (
     ACCENT,
     BEFORE,
@@ -46,7 +45,6 @@ from paint_deposition.report.film_pictures import page_film
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
 # A profile's two charts with the room around them [in].
 PROFILE_IN = PAGE_IN, 3.0
-LINE_POINTS = 600
 # The longer side of a part with its points [in].
 PART_IN = 9.0
 
@@ -108,7 +106,7 @@ def comparison_figure(data: ReportData) -> Figure:
         columns = count if count < 4 else 2
     rows = -(-count // columns)
     heights_in = (0.4, rows * PROFILE_IN[1])
-    figure = _free_figure(columns * PROFILE_IN[0], sum(heights_in))
+    figure = new_figure(columns * PROFILE_IN[0], sum(heights_in), None)
     above, below = figure.subfigures(2, 1, height_ratios=heights_in)
     places = below.subfigures(rows, columns, squeeze=False).ravel()
     for place, profile in zip(places, data.profiles, strict=False):
@@ -120,71 +118,57 @@ def comparison_figure(data: ReportData) -> Figure:
 
 def profile_figures(data: ReportData) -> tuple[list[Figure], list[tuple[str, str, str]]]:
     """A picture of each column or row; and words, colour and kind of mark of their legend."""
-    drawn = [_draw_profile(_free_figure(*PROFILE_IN), data, one) for one in data.profiles]
+    drawn = [_draw_profile(new_figure(*PROFILE_IN, None), data, p) for p in data.profiles]
     kinds = ('bold' if line['width'] > 2.0 else 'line' for line in data.lines)
     models = zip(data.model_names, (line['color'] for line in data.lines), kinds, strict=True)
     measured = ('measured, bars: 95 % gauge and texture', INK, 'dot')
     return drawn, [measured, *models, ('each pass alone', BEFORE, 'dots')]
 
 
-def _free_figure(width_in: float, height_in: float) -> Figure:
-    """A figure whose axes are placed by hand: to lay so many out takes as long as to draw them."""
-    figure = new_figure(width_in, height_in)
-    figure.set_layout_engine('none')
-    return figure
-
-
 def _draw_profile(place: AnyFigure, data: ReportData, profile: Profile) -> AnyFigure:
-    """Draw a column or row on the scale of all."""
+    """Draw the film along a column or row, readings with the gauge's noise, and the residual."""
     room = {'left': 0.15, 'right': 0.98, 'bottom': 0.15, 'top': 0.92, 'hspace': 0.1}
     film, residual = place.subplots(2, 1, sharex=True, height_ratios=(3, 1), gridspec_kw=room)
-    _draw_film(film, data, profile)
-    # Measured minus predicted, of the last model with the gauge's noise.
-    quiet(residual, f'{profile.axis} [mm]', 'residual [µm]', size=TEXT_PT)
-    at_mm, bars_um = MM * profile.position_m, TWO_SIDED_95 * data.study.sigma_um
-    for k, colour in enumerate(data.colours):
-        last = k == len(data.models) - 1
-        residual.errorbar(
-            at_mm, data.residuals_um[k][profile.rows],
-            bars_um[profile.rows] if last else np.zeros(len(at_mm)),
-            fmt='o-', ms=2.5, lw=0.8, elinewidth=0.7, color=colour,
-        )  # fmt: skip
-    residual.axhline(0.0, color=MUTED, lw=0.8)
-    tops_um = [(data.study.measured_um + bars_um).max()]
-    tops_um += [np.nanmax(one.lines_um) for one in data.profiles if one.lines_um.size]
-    film.set(xlabel='', ylim=(0.0, 1.05 * max(tops_um)))
-    reach_um = 1.05 * max((np.abs(one) + bars_um).max() for one in data.residuals_um)
-    residual.set_ylim(-reach_um, reach_um)
-    return place
-
-
-def _draw_film(axes: Axes, data: ReportData, profile: Profile) -> None:
-    """Draw readings with the gauge's noise, and the models' film."""
-    quiet(axes, f'{profile.axis} [mm]', 'film [µm]', size=TEXT_PT)
     of = f'{profile.experiment}, ' if len(data.experiments) > 1 else ''
     errors = [f'{c.points.select(profile.rows).rmse_um:.2f}' for c in data.comparisons]
     title = f'{of}{profile.label}:  RMSE {" → ".join(errors)} µm'
+    quiet(film, '', 'film [µm]', size=TEXT_PT)
     # As many letters of a title fit over a chart; one that is longer is written smaller.
     title_pt = (TEXT_PT + 1.0) * min(1.0, 41 / len(title))
-    axes.set_title(title, loc='left', fontsize=title_pt, color=INK, y=1.0)
+    film.set_title(title, loc='left', fontsize=title_pt, color=INK, y=1.0)
+    quiet(residual, f'{profile.axis} [mm]', 'residual [µm]', size=TEXT_PT)
     at_mm, line_mm = MM * profile.position_m, MM * profile.line_m
-    measured_um = data.study.measured_um[profile.rows]
-    axes.errorbar(
-        at_mm, measured_um, TWO_SIDED_95 * data.study.sigma_um[profile.rows], fmt='o', ms=3,
-        color=INK, elinewidth=0.8, label='measured, bars: 95 % gauge and texture', zorder=5,
+    all_bars_um = TWO_SIDED_95 * data.study.sigma_um
+    measured_um, bars_um = data.study.measured_um[profile.rows], all_bars_um[profile.rows]
+    film.errorbar(
+        at_mm, measured_um, bars_um, fmt='o', ms=3, color=INK, elinewidth=0.8,
+        label='measured, bars: 95 % gauge and texture', zorder=5,
     )  # fmt: skip
     for k, (name, line) in enumerate(zip(data.model_names, data.lines, strict=True)):
+        last, residual_um = k == len(data.models) - 1, data.residuals_um[k][profile.rows]
         # The thin line lies over the bold one, so that both are seen where they agree.
         style: dict[str, Any] = {'color': line['color'], 'label': name, 'zorder': 3 - 0.1 * k}
         if len(line_mm):
-            axes.plot(line_mm, profile.lines_um[k], lw=0.85 * line['width'], **style)
+            film.plot(line_mm, profile.lines_um[k], lw=0.85 * line['width'], **style)
         else:
-            filled = 'full' if k == len(data.models) - 1 else 'none'
-            predicted_um = measured_um - data.residuals_um[k][profile.rows]
-            axes.plot(at_mm, predicted_um, 'o', ms=4, fillstyle=filled, **style)
+            filled = 'full' if last else 'none'
+            film.plot(at_mm, measured_um - residual_um, 'o', ms=4, fillstyle=filled, **style)
+        # Of the last model with the gauge's noise.
+        residual.errorbar(
+            at_mm, residual_um, bars_um if last else np.zeros(len(at_mm)), fmt='o-', ms=2.5,
+            lw=0.8, elinewidth=0.7, color=data.colours[k],
+        )  # fmt: skip
     for number, single in enumerate(profile.passes_um):
         label = '' if number else 'each pass alone'
-        axes.plot(line_mm, single, ':', color=BEFORE, lw=1.0, label=label)
+        film.plot(line_mm, single, ':', color=BEFORE, lw=1.0, label=label)
+    residual.axhline(0.0, color=MUTED, lw=0.8)
+    # On the scale of all.
+    tops_um = [(data.study.measured_um + all_bars_um).max()]
+    tops_um += [np.nanmax(one.lines_um) for one in data.profiles if one.lines_um.size]
+    film.set_ylim(0.0, 1.05 * max(tops_um))
+    reach_um = 1.05 * max((np.abs(one) + all_bars_um).max() for one in data.residuals_um)
+    residual.set_ylim(-reach_um, reach_um)
+    return place
 
 
 def write_calibration_pictures(
@@ -196,36 +180,30 @@ def write_calibration_pictures(
     written = [save_picture(comparison_figure(data), folder / f'profiles.{suffix}')]
     panels = [panel for panel in calibration.panels if panel is not None]
     if panels:
-        figure = new_figure(6.4, 4.2)
-        draw_collapse(figure.subplots(), calibration, panels[0])
+        # Eq. (3) of a panel with its three Gaussians, and the 2D model's own collapse.
+        figure, panel, fitted = new_figure(6.4, 4.2), panels[0].panel, panels[0].collapse
+        axes = figure.subplots()
+        quiet(axes, 'across the pass [mm]', 'film [µm]', 'One pass, eq. (3)')
+        x = np.linspace(-0.6, 0.6, 600) * fitted.reach_m
+        names = (r'at $+r_1$', r'at $-r_2$', 'centred')
+        for part, name, colour in zip(fitted.components_um(x), names, COMPONENTS, strict=True):
+            axes.plot(MM * x, part, color=colour, linewidth=1.3, linestyle='--', label=name)
+        total_um = fitted.thickness_um(x)
+        axes.plot(MM * x, total_um, color=INK, linewidth=2.0, label='sum of the three')
+        own = sampled_collapse(
+            calibration.model.painting_with(panel.brush), float(panel.speed_m_per_s[0]),
+            standoff_m=panel.distance_m, travel_rad=panel.travel_rad,
+        )  # fmt: skip
+        own_um = own.thickness_um(x)
+        axes.plot(MM * x, own_um, color=ACCENT, linewidth=1.6, label='2D model, collapsed')
+        axes.set_xlim(MM * x[0], MM * x[-1])
+        axes.set_ylim(bottom=0.0)
+        legend(axes, loc='upper right')
         written.append(save_picture(figure, folder / f'collapse.{suffix}'))
     figure = new_figure(5.2, 5.0)
     predicted_um = calibration.fit.predicted_um
     draw_agreement(figure.subplots(), study.measured_um, predicted_um, study.sigma_um)
     return [*written, save_picture(figure, folder / f'agreement.{suffix}')]
-
-
-def draw_collapse(axes: Axes, calibration: Calibration, one: PanelFit) -> None:
-    """Draw eq. (3) of a panel with its three Gaussians, and the 2D model's own collapse."""
-    quiet(axes, 'across the pass [mm]', 'film [µm]', 'One pass, eq. (3)')
-    fitted, panel = one.collapse, one.panel
-    x = np.linspace(-0.6, 0.6, LINE_POINTS) * fitted.reach_m
-    names = (r'at $+r_1$', r'at $-r_2$', 'centred')
-    for part, name, colour in zip(fitted.components_um(x), names, COMPONENTS, strict=True):
-        axes.plot(MM * x, part, color=colour, linewidth=1.3, linestyle='--', label=name)
-    axes.plot(MM * x, fitted.thickness_um(x), color=INK, linewidth=2.0, label='sum of the three')
-    own = sampled_collapse(
-        calibration.model.painting_with(panel.brush),
-        float(panel.speed_m_per_s[0]),
-        standoff_m=panel.distance_m,
-        travel_rad=panel.travel_rad,
-    )
-    axes.plot(
-        MM * x, own.thickness_um(x), color=ACCENT, linewidth=1.6, label='2D model, collapsed'
-    )
-    axes.set_xlim(MM * x[0], MM * x[-1])
-    axes.set_ylim(bottom=0.0)
-    legend(axes, loc='upper right')
 
 
 def draw_agreement(
@@ -268,11 +246,10 @@ def write_measuring_picture(path: str | Path, chosen: ChosenReadings) -> Path:
     return save_picture(figure, path)
 
 
-def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = None) -> None:
+def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture) -> None:
     """Draw the part, its film and its points on axes of your own, seen from the gun's side."""
-    part = part or PartPicture.of(chosen.surface)
     scale = film_scale(chosen.film_um)
-    part.dress(axes, *part.window())
+    part.view.dress(axes, *part.window())
     part.draw(axes, scale.rgba(chosen.film_um, chosen.film_um > NO_PAINT_UM))
     part.draw_contours(axes, chosen.film_um, scale.low, scale.high)
     places = part.view.flat(chosen.positions_m)

@@ -93,8 +93,10 @@ def effect_meaning(effect: type[Effect] | None) -> str:
     return capital(next(filter(None, [effect.signature, *described]), '').rstrip('.') + '.')
 
 
-def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
-    """A learned law's values and its range as (words, value, unit)."""
+def learned_rows(law: Effect | None) -> list[dict[str, str]]:
+    """A learned law's values and its range: words, value, unit; nothing for other effects."""
+    if not isinstance(law, LearnedLaw):
+        return []
     curve = np.array(law.learned)
     if isinstance(law, LearnedFootprint):
         along = np.linspace(-law.reach_m, law.reach_m, 101)
@@ -103,26 +105,17 @@ def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
         curve = np.maximum(1.0 + curve, LEAST_FACTOR)
     least, most = number(float(curve.min())), number(float(curve.max()))
     shown = ('addition', 'µm') if law.kind == 'addition' else ('factor', '')
-    words = [(shown[0], f'{least} to {most}', shown[1])]
+    rows = [(shown[0], f'{least} to {most}', shown[1])]
     if isinstance(law, LearnedCurve):
         low, high = (number(counted_from_1(law.covariate, end)) for end in (law.low, law.high))
-        words.append(('over', f'{low} to {high}', unit_words(law.unit)))
+        rows.append(('over', f'{low} to {high}', unit_words(law.unit)))
     elif isinstance(law, LearnedMap):
         for grid in law.maps:
             sides = 1e3 * np.subtract(grid.high_m, grid.low_m)
-            words.append(('over', ' × '.join(f'{side:.0f}' for side in sides), 'mm of a part'))
+            rows.append(('over', ' × '.join(f'{side:.0f}' for side in sides), 'mm of a part'))
     elif isinstance(law, LearnedFootprint):
-        words.append(('out to', number(1e3 * law.reach_m), 'mm from the axis on the model plane'))
-    return words
-
-
-def law_lines(law: Effect | None) -> list[str]:
-    """A learned law in a line for its values and range, and in one for its closed forms."""
-    if not isinstance(law, LearnedLaw):
-        return []
-    shape = ', '.join(' '.join(row).rstrip() for row in learned_words(law))
-    forms = [form_words(law)] if isinstance(law, LearnedCurve) and law.sd else []
-    return [f'{effect_name(law.id)}: {shape}', *forms]
+        rows.append(('out to', number(1e3 * law.reach_m), 'mm from the axis on the model plane'))
+    return [dict(zip(('words', 'value', 'unit'), row, strict=True)) for row in rows]
 
 
 def form_words(law: LearnedCurve) -> str:

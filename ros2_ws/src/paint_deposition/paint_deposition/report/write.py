@@ -85,6 +85,7 @@ def plot(result: Any, ax: 'Axes | None' = None) -> 'Axes':
     from paint_deposition.planning.faces import PartPlan
     from paint_deposition.planning.plan import Plan
     from paint_deposition.planning.recommendation import Recommendation
+    from paint_deposition.report.drawing import PartPicture
     from paint_deposition.report.film_pictures import draw_film
     from paint_deposition.report.plan_pictures import draw_curve
     from paint_deposition.report.readings_pictures import draw_agreement, draw_points
@@ -95,9 +96,9 @@ def plot(result: Any, ax: 'Axes | None' = None) -> 'Axes':
         ax = pyplot.gca()
     if isinstance(result, Film | Plan | PartPlan):
         above_um = result.statistics.painted_above_um
-        draw_film(ax, result.surface, result.film_um, result.path, above_um)
+        draw_film(ax, PartPicture.of(result.surface), result.film_um, result.path, above_um)
     elif isinstance(result, ChosenReadings):
-        draw_points(ax, result)
+        draw_points(ax, result, PartPicture.of(result.surface))
     elif isinstance(result, Recommendation):
         draw_curve(ax, result)
     elif isinstance(result, Calibration):

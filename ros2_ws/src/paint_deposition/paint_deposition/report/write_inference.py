@@ -111,7 +111,7 @@ def _write_results(
     folder: Path, name: str, figures: dict[str, Any], data: ReportData, pictures: str
 ) -> list[Path]:
     """Figures, picture, report, and residuals: of the last model, or of each side by side."""
-    beside = dict(zip(data.names, data.comparisons, strict=True)) if data.names else {}
+    beside = data.beside.by_name if data.beside else {}
     models = {name: comparison.model for name, comparison in beside.items()}
     residuals = {f'residuals_{file_name(name)}.csv': one for name, one in beside.items()}
     residuals = residuals or {'residuals.csv': data.comparisons[-1]}

@@ -22,7 +22,6 @@ from paint_deposition.inference.readings.covariates import varies
 from paint_deposition.inference.readings.plausibility import geometry_by_experiment
 from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.part.zones import Zone
-from paint_deposition.tabular import Tabular
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ class Misfit:
 
 
 @dataclass(frozen=True)
-class Comparison(Tabular):
+class Comparison:
     """The model compared with the readings.
 
     Attributes:

@@ -22,7 +22,6 @@ from paint_deposition.inference.fitting.posterior import PatternShift, posterior
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
-from paint_deposition.tabular import Tabular
 
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
 
@@ -120,7 +119,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Diagnosis(Tabular):
+class Diagnosis:
     """The verdict and what it rests on.
 
     Attributes:

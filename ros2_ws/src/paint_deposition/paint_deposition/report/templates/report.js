@@ -16,6 +16,20 @@
     modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'],
     toImageButtonOptions: {format: 'png', scale: 2},
   };
+  // Quiet charts on the page's own background and in its font, with thin grids and outward ticks.
+  const [ink, muted, edge, clear] = ['#1f2933', '#616e7c', '#9aa5b1', 'rgba(0,0,0,0)'];
+  const axis = {
+    title: {font: {size: 12, color: muted}, standoff: 6}, gridcolor: '#e4e7eb',
+    zeroline: false, zerolinecolor: muted, zerolinewidth: 1, linecolor: edge, showline: true,
+    ticks: 'outside', ticklen: 4, tickcolor: edge, tickfont: {size: 11, color: muted},
+    automargin: true,
+  };
+  const template = {layout: {
+    font: {family: 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif', size: 12, color: ink},
+    paper_bgcolor: clear, plot_bgcolor: clear, margin: {l: 48, r: 12, t: 8, b: 44},
+    showlegend: false, modebar: {bgcolor: clear, color: edge, activecolor: '#00708c'},
+    xaxis: axis, yaxis: axis,
+  }};
   // A finger has no place to rest on: the tools would hide the chart.
   const pointer = matchMedia('(hover: hover)').matches;
   const flat = {...options, displayModeBar: pointer && 'hover'};
@@ -38,7 +52,8 @@
     if (box) box.style.aspectRatio = `${element.clientWidth} / ${element.clientHeight}`;
   };
 
-  const draw = (element, data, layout, config) => Plotly.newPlot(element, data, layout, config)
+  const draw = (element, {data, layout}) => Plotly
+    .newPlot(element, data, {...layout, template}, flat)
     .then(() => {
       root.dataset.drawn = ++drawn;
       element.dataset.drawn = '';
@@ -55,7 +70,7 @@
     if (!host) return;
     if (figure.legend.length) {
       const legend = make('p', host, 'legend');
-      for (const {words, colour, kind} of figure.legend) {
+      for (const [words, colour, kind] of figure.legend) {
         make('i', make('span', legend), kind).style.color = colour;
         legend.lastChild.append(words);
       }
@@ -64,7 +79,7 @@
     for (const chart of figure.charts) {
       const panel = make('figure', charts);
       if (chart.title) make('figcaption', panel, '', chart.title);
-      await draw(make('div', panel, 'chart'), chart.data, chart.layout, flat);
+      await draw(make('div', panel, 'chart'), chart);
       await rest();
     }
   }
