@@ -78,6 +78,20 @@ def test_true_values_lie_in_their_intervals_and_undetermined_ones_are_named(pane
     assert any(warning.startswith('phi_rad is not determined') for warning in calibrated.warnings)
 
 
+def test_a_pattern_that_no_bell_has_is_named_as_what_the_model_lacks(panel):
+    """Fog that settles low looks like a ring as large as the panel."""
+    film_um, height_m = panel.means.mean_um, column()[:, 2]
+    foggy = with_film(panel, film_um + 40.0 * np.exp(-height_m[: len(film_um)] / 0.4))
+    calibrated = pd.calibrate(pd.Campaign((foggy,)))
+    strange = [one for one in calibrated.parameters if 'no usual bell has' in one.reason]
+    assert {one.name for one in strange} <= {'r_m', 'sigma1_m', 'sigma2_m'}
+    assert strange
+    assert not any(one.determined for one in strange)
+    assert f'no usual bell has {strange[0].value:.2f} m; what the model lacks may have driven' in (
+        ' '.join(calibrated.warnings)
+    )
+
+
 def test_crosswise_passes_determine_the_asymmetry(panel):
     """They are further off than the model plane, which is taken into account."""
     across = [[x, 0.0, 1.0] for x in np.linspace(-0.38, 0.38, 25)]

@@ -10,6 +10,8 @@ from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES, Pat
 
 # Places of K3 and phi among the parameters of a pattern.
 K3, PHASE = map(PATTERN_NAMES.index, ('K3', 'phi_rad'))
+# These are the entries at the same places of the vector.
+LENGTHS = PATTERN_NAMES[PHASE + 1 :]
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,11 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
     """
     covariance = scaled_covariance(fit, shifts)
     sigma = np.sqrt(np.diag(_spread(fit, covariance)))
+    weak = fit.parameters.weak_prior
     # A parameter was measured if its width has fallen below this share of its weak prior's.
-    learned = np.sqrt(np.diag(covariance)) <= 0.5 * fit.parameters.weak_prior.width
+    learned = np.sqrt(np.diag(covariance)) <= 0.5 * weak.width
+    # So many standard deviations of it away no bell is.
+    strange = np.abs(fit.vector - weak.centre) > 3.0 * weak.width
     values = fit.parameters.values(fit.vector[np.newaxis])[0]
     pattern, found = fit.parameters.pattern, []
     random = np.random.default_rng(0)
@@ -48,9 +53,16 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
     for k, name in enumerate(_names(fit)):
         row, place = divmod(k, len(PATTERN_NAMES))
         if row < pattern.count:
-            own, first = learned[pattern.entries(row)], k - place
+            own, first = pattern.entries(row), k - place
             k3, sigma_k3 = values[first + K3], sigma[first + K3]
-            reason = _pattern_reason(PATTERN_NAMES[place], values[k], sigma[k], own, k3, sigma_k3)
+            reason = _pattern_reason(
+                PATTERN_NAMES[place], values[k], sigma[k], learned[own], k3, sigma_k3
+            )
+            if PATTERN_NAMES[place] in LENGTHS and strange[own[place]]:
+                reason = (
+                    f'no usual bell has {values[k]:.2f} m; what the model lacks may have driven '
+                    'it there, see paint diagnose'
+                )
         else:
             entry = k - len(pattern.names) + len(pattern)
             reason = '' if learned[entry] else 'its effect hardly shows at these points'
