@@ -132,9 +132,9 @@ class LeftOut:
         self.stages, self.final, self.options = stages, final, options
         self.study = final.state.study
         self.folds = {
-            'parts': self.study.folds(),
-            PLACE: self.study.scattered(),
-            FOOTPRINT: self.study.patches(),
+            'parts': self.study.folds,
+            PLACE: self.study.scattered,
+            FOOTPRINT: self.study.patches,
         }
         self._known: dict[tuple[frozenset[str], str], np.ndarray] = {}
 
@@ -154,7 +154,7 @@ class LeftOut:
         key = without, of
         if key not in self._known:
             predict = partial(self._predicted, without)
-            self._known[key] = self.study.squares_left_out_um2(predict, self.folds[of])
+            self._known[key] = self.study.squares_left_out_um2(predict, self.folds[of]())
         return np.sqrt(np.mean(self._known[key][:, rows], axis=1))
 
     def borne_out(

@@ -10,8 +10,6 @@ from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES, Pat
 
 # Places of K3 and phi among the parameters of a pattern.
 K3, PHASE = map(PATTERN_NAMES.index, ('K3', 'phi_rad'))
-# These are the entries at the same places of the vector.
-LENGTHS = PATTERN_NAMES[PHASE + 1 :]
 
 
 @dataclass(frozen=True)
@@ -55,14 +53,8 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
         if row < pattern.count:
             own, first = pattern.entries(row), k - place
             k3, sigma_k3 = values[first + K3], sigma[first + K3]
-            reason = _pattern_reason(
-                PATTERN_NAMES[place], values[k], sigma[k], learned[own], k3, sigma_k3
-            )
-            if PATTERN_NAMES[place] in LENGTHS and strange[own[place]]:
-                reason = (
-                    f'no usual bell has {values[k]:.2f} m; what the model lacks may have driven '
-                    'it there, see paint diagnose'
-                )
+            known = learned[own], strange[own], k3, sigma_k3
+            reason = _pattern_reason(PATTERN_NAMES[place], values[k], sigma[k], *known)
         else:
             entry = k - len(pattern.names) + len(pattern)
             reason = '' if learned[entry] else 'its effect hardly shows at these points'
@@ -124,9 +116,14 @@ def _spread(fit: Fit, covariance: np.ndarray) -> np.ndarray:
 
 
 def _pattern_reason(
-    name: str, value: float, sigma: float, learned: np.ndarray, k3: float, sigma_k3: float
-) -> str:
-    """Why a parameter of the pattern is not determined, '' if it is."""
+    name: str, value: float, sigma: float, learned: np.ndarray, strange: np.ndarray, k3: float,
+    sigma_k3: float,
+) -> str:  # fmt: skip
+    """Why a parameter of the pattern is not determined, '' if it is.
+
+    Args:
+        learned, strange: (7,) bool, of the entries of the pattern.
+    """
     if name == 'phi_rad':
         # With the asymmetry so few standard deviations from zero its phase means nothing.
         if k3 < 2.0 * sigma_k3:
@@ -141,6 +138,11 @@ def _pattern_reason(
             'rolled by 90 deg',
         }.get(int(learned[2]) + int(learned[3]), '')
     row = {'K1_cm3_per_s': 0, 'K2': 1, 'r_m': 4, 'sigma1_m': 5, 'sigma2_m': 6}[name]
+    if name.endswith('_m') and strange[row]:
+        return (
+            f'no usual bell has {value:.2f} m; what the model lacks may have driven it there, see '
+            'paint diagnose'
+        )
     if not learned[row]:
         return 'its value comes from the prior of usual bells'
     # So large a standard deviation leaves the first digit open.
