@@ -189,8 +189,7 @@ class PaintNode(Node):
 
     def _files_of(self, values: Mapping[str, Any]) -> list[str]:
         """The paths that parameters hold."""
-        rows = self.PARAMETERS.items()
-        paths = {name for name, row in rows if row.description.endswith('[path]')}
+        paths = {name for name, row in self.PARAMETERS.items() if row.is_path}
         held = [values[name] for name in values.keys() & paths]
         return [file for each in held for file in np.atleast_1d(each).tolist() if file]
 

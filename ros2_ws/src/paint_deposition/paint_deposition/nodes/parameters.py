@@ -47,6 +47,11 @@ class NodeParameter:
     fixed_while: str = RUNS
 
     @property
+    def is_path(self) -> bool:
+        """Whether it names a file or a folder, or several."""
+        return self.description.endswith('[path]')
+
+    @property
     def ros_type(self) -> Parameter.Type:
         value = [self.element()] if self.element else self.default
         return Parameter.Type.from_parameter_value(value)
@@ -84,7 +89,7 @@ class NodeParameter:
             low, high = self.bounds
             limits |= {'ge': low} | ({'le': high} if math.isfinite(high) else {})
         kind = Literal[self.choices] if self.choices else Annotated[kind, Field(**limits)]
-        if self.description.endswith('[path]'):
+        if self.is_path:
             # No shell expands a leading ~ in parameter files or after :=.
             kind = Annotated[kind, AfterValidator(os.path.expanduser)]
         try:
