@@ -1,8 +1,9 @@
 """Whether a better model paints a better part: paint, measure, diagnose, plan again, paint.
 
 The virtual paint shop paints doors whose hidden effects the model does not have. A bell is
-calibrated on a panel and a door is planned with it; it is painted and measured at 60 points, the
-diagnosis names or learns what is missing, and speeds and triggers are chosen again with its model.
+calibrated on a panel, which is diagnosed where the calibration warns that something is missing.
+A door is planned with it, painted and measured at 60 points; the diagnosis names or learns what is
+missing, and speeds and triggers are chosen again with its model.
 All films are the shop's own. An oracle knows which effects act and has 300 readings without noise.
 Results are kept line by line, so that a run can be cut off and taken up again.
 """
@@ -87,7 +88,7 @@ def run_one(job: tuple[int, str, int]) -> list[dict]:
 
 def _turned(world: World) -> dict:
     rng = stream(world.seed, 90)
-    calibration = paint.calibrate(world.campaign('calibration'))
+    calibration = _calibrated(world.campaign('calibration'))
     vertices, faces = world.part.mesh()
     surface = paint.Surface.from_triangles(vertices, faces, 0.02)
     target = 20.0
@@ -121,12 +122,20 @@ def _turned(world: World) -> dict:
     }
 
 
+def _calibrated(campaign: paint.Campaign) -> paint.Calibration | paint.Diagnosis:
+    """The bell from its panel, as the warnings say: diagnosed where something is missing."""
+    calibration = paint.calibrate(campaign)
+    if any('paint diagnose' in warning for warning in calibration.warnings):
+        return paint.diagnose(campaign)
+    return calibration
+
+
 def _oracle(world: World, given: Trajectory, rng: np.random.Generator):
     """The model of somebody who knows which effects act, from many readings without noise."""
     spots = scatter(world.part, ORACLE_READINGS, rng, 0.005)
     dense = world.painted('dense', given, 0).measured(*spots, None)
     campaign = world.campaign('oracle', dense)
-    model = paint.calibrate(campaign).model
+    model = _calibrated(campaign).model
     for truth in world.truths:
         if truth.id in EFFECTS and model.effect(truth.id) is None:
             model = paint.refit(campaign, truth.id, model).model

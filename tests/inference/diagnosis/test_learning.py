@@ -15,6 +15,7 @@ from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.diagnosis import learning
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, of_places
 from paint_deposition.inference.diagnosis.gaussian import NullModel
+from paint_deposition.inference.diagnosis.model_space import ModelSpace
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.search import Search, SearchStage
 from paint_deposition.inference.diagnosis.smooth_laws import Basis
@@ -69,12 +70,12 @@ def begun(campaign: pd.Campaign, *library: str) -> DiagnosisState:
 
 
 @pytest.mark.slow
-def test_what_no_law_explains_is_learned_without_the_parts_left_out():
+def test_what_no_law_explains_is_learned_without_the_parts_left_out(monkeypatch):
     """The flow rises and levels off, which no effect of the library does."""
     rising = gauged(BASE.with_effect(RISING), seed=2, orders=THREE)
     nothing = Search(begun(rising)).nothing
     over_time = [law for law in nothing.state.nonparametric_laws if law.learns == 'time_s']
-    left_out = learning.LeftOut([SearchStage(nothing, [])], nothing, over_time)
+    left_out = learning.LeftOut(nothing, [SearchStage(nothing, [])], nothing, over_time)
     without, *with_laws = left_out.errors_um()
     noise_um = nothing.state.study.noise_floor_um
     assert without > 1.7 * noise_um
@@ -93,6 +94,11 @@ def test_what_no_law_explains_is_learned_without_the_parts_left_out():
         learned = refit(others, BASE, LEARNED['time_s']).model
         anew.append(compare(Study.of(pd.Campaign((part,))), learned).points.residual_um)
     assert with_laws[0] == pytest.approx(root_mean_square(np.concatenate(anew)), rel=0.15)
+    # Parts by which nothing would be missing predict the one left out as if nothing were.
+    monkeypatch.setattr(ModelSpace, 'p_values', lambda self, seed: (1.0, 1.0))
+    stages, found = [SearchStage(nothing, [])], replace(nothing)
+    unaware = learning.LeftOut(nothing, stages, found, over_time)
+    assert unaware.error_um(law) == pytest.approx(without)
 
 
 @pytest.mark.slow
@@ -108,7 +114,8 @@ def test_a_law_that_improves_one_part_only_is_not_chosen_by_that_part():
         def errors_um(self, without=frozenset(), of='parts', rows=slice(None)):
             return np.sqrt(np.mean((study.measured_um - films_um)[:, rows] ** 2, axis=1))
 
-    given, law = Given([SearchStage(nothing, [])], nothing, []), [(WAVY, 1.0)]
+    given = Given(nothing, [SearchStage(nothing, [])], nothing, [])
+    law = [(WAVY, 1.0)]
     assert given.errors_um()[1] < 0.9
     assert given.borne_out(law) == 1
     assert given.error_um(law) == pytest.approx(np.sqrt((1.0 + 2.0 * 1.02**2) / 3.0))
@@ -125,9 +132,8 @@ def test_a_map_is_borne_out_by_points_within_a_spot_that_a_patch_takes_out_as_a_
     spotted = reading(panel, panel.readings.thickness_um - less_um)
     nothing = Search(begun(pd.Campaign((spotted,)))).nothing
     study = nothing.state.study
-    left_out = learning.LeftOut(
-        [SearchStage(nothing, [])], nothing, [*of_places(study, nothing.fit.model)]
-    )
+    maps = [*of_places(study, nothing.fit.model)]
+    left_out = learning.LeftOut(nothing, [SearchStage(nothing, [])], nothing, maps)
     without, by_patches, _ = left_out.errors_um()
     assert by_patches == pytest.approx(without, rel=0.02)
     without, by_points, _ = left_out.errors_um(of='place')
@@ -158,8 +164,9 @@ def test_a_fold_that_calls_for_another_set_goes_no_further(monkeypatch):
         expected = study.errors_left_out_um(
             lambda out, fits=fits: study.predicted_without_um(fits[folds[out][0]], out)
         )
-        found_um = learning.LeftOut(stages, final, []).errors_um()
-        assert found_um == pytest.approx([expected] * (1 + learning.MOST_LAWS))
+        left_out = learning.LeftOut(first, stages, final, [])
+        assert left_out.errors_um() == pytest.approx([expected] * (1 + learning.MOST_LAWS))
+        assert left_out.error_um() == pytest.approx(expected)
 
 
 @pytest.mark.slow

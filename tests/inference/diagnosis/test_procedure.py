@@ -12,7 +12,8 @@ from inference.fitting.panels import ORDERS, gauged, reading
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.files.atomic import json_text
 from paint_deposition.inference.diagnosis.model_space import SURE
-from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
+from paint_deposition.inference.diagnosis.model_space import ALPHA
+from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.inference.readings.campaign import Experiment

@@ -18,8 +18,7 @@ from paint_deposition.files.atomic import filled, plain, write_text
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import CPK_MEANS, film_statistics
 from paint_deposition.inference.comparison.comparison import SideBySide
-from paint_deposition.inference.diagnosis.model_space import SURE
-from paint_deposition.inference.diagnosis.procedure import ALPHA
+from paint_deposition.inference.diagnosis.model_space import ALPHA, SURE
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.planning.improvement import Improvement
 from paint_deposition.report import charts, words

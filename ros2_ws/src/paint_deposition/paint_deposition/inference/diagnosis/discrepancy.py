@@ -197,6 +197,18 @@ class ModelDiscrepancy:
         """The discrepancy where pattern and place of a spray vary as around another fit."""
         return replace(self, shapes=_shapes(study, fit, self.setting_of))
 
+    def select(self, rows: np.ndarray) -> 'ModelDiscrepancy':
+        """The discrepancy at some of the points."""
+        both, columns = np.ix_(rows, rows), (each[rows] for each in self.footprint.columns)
+        return replace(
+            self,
+            footprint=replace(self.footprint, columns=tuple(columns)),
+            shapes=self.shapes[both],
+            settings=tuple(field[both] for field in self.settings),
+            parts=tuple(field[both] for field in self.parts),
+            setting_of=self.setting_of[rows],
+        )
+
     def choices(self) -> list[DiscrepancyHyperparameters]:
         """All choices of the hyperparameters; the prior of those of nature sums to one."""
         settings = {size: _log_prior(size, *PRIOR.usual_setting) for size in PRIOR.settings}

@@ -21,7 +21,7 @@ from paint_deposition.inference.diagnosis.gaussian import (
     OrthogonalDirections,
     simulated,
 )
-from paint_deposition.inference.diagnosis.model_space import DRAWS, SIZES
+from paint_deposition.inference.diagnosis.model_space import ALPHA, DRAWS, SIZES
 from paint_deposition.inference.diagnosis.search import EffectSet, SearchStage
 from paint_deposition.inference.diagnosis.verdict import Unknown
 from paint_deposition.inference.fitting.least_squares import Fit
@@ -121,15 +121,17 @@ class LeftOut:
     the end, its set is the final one, too. The fits of the sets are shared by all folds.
 
     Args:
+        nothing: the model that was tested.
         stages: of the search.
         final: the set that remained of the last one.
         options: laws of any form that may be learned.
     """
 
     def __init__(
-        self, stages: Sequence[SearchStage], final: EffectSet, options: Sequence[Explanation]
-    ) -> None:
-        self.stages, self.final, self.options = stages, final, options
+        self, nothing: EffectSet, stages: Sequence[SearchStage], final: EffectSet,
+        options: Sequence[Explanation],
+    ) -> None:  # fmt: skip
+        self.nothing, self.stages, self.final, self.options = nothing, stages, final, options
         self.study = final.state.study
         self.folds = {
             'parts': self.study.folds,
@@ -180,15 +182,24 @@ class LeftOut:
                 kept = count
         return kept
 
-    def error_um(self, laws: Sequence[Sized], without: frozenset[str] = frozenset()) -> float:
-        """With as many of some laws on each part left out as the other parts bear out [um]."""
-        folds = self.study.folds()
-        squares_um2 = 0.0
-        for fold in np.unique(folds):
-            out = folds == fold
+    def error_um(
+        self, laws: Sequence[Sized] = (), without: frozenset[str] = frozenset()
+    ) -> float:
+        """On each part left out with what the other parts lead to [um].
+
+        With as many of some laws as they bear out; with nothing at all where their test finds
+        nothing, but something was found with all parts.
+        """
+        study, nothing, folds = self.study, self.nothing, self.study.folds()
+        squares_um2 = np.zeros(len(study))
+        for out in (folds == fold for fold in np.unique(folds)):
             count = self.borne_out(laws, without, ~out)
-            squares_um2 += float(self.errors_um(without, rows=out)[count]) ** 2 * out.sum()
-        return float(np.sqrt(squares_um2 / len(self.study)))
+            squares_um2[out] = self.errors_um(without, rows=out)[count] ** 2
+            p_values = nothing.space.select(~out).p_values(nothing.state.seed)
+            if min(p_values) >= ALPHA and nothing is not self.final:
+                predict = partial(study.predicted_without_um, nothing.fit)
+                squares_um2[out] = study.squares_left_out_um2(predict, folds)[out]
+        return float(np.sqrt(np.mean(squares_um2)))
 
     def _predicted(self, without: frozenset[str], out: np.ndarray) -> np.ndarray:
         """(n, P) films with 0 to n - 1 laws, found without some readings (P,) [um]."""

@@ -48,7 +48,9 @@ CREDIBLE = 0.95
 # Between sizes of the footprint that are three times as large as the next none is tried: standard
 # deviation of the logarithm within each.
 WITHIN_SIZE = np.log(3.0) / np.sqrt(12.0)
-# Simulations behind a p-value.
+# Significance level of the test that something is missing, the share of it that the test for
+# causes has, and simulations behind a p-value.
+ALPHA, OF_CAUSES = 0.05, 0.95
 DRAWS = 1000
 # Of each size of the footprint so many sizes of fields are kept at most, and none whose share of
 # the posterior is smaller: with more effects another footprint may be the more probable one.
@@ -153,10 +155,11 @@ class WeightedNull(NamedTuple):
             prior += LOG_ODDS_UNKNOWN
         return WeightedNull(sizes, null, prior, evidence + prior)
 
-    def log_weight_of(self, rows: np.ndarray, freedom: float) -> float:
-        """Logarithm of the weight by some readings (P,) only."""
+    def select(self, rows: np.ndarray, freedom: float) -> 'WeightedNull':
+        """The same by some readings (P,) only."""
         some = self.null.select(rows)
-        return self.log_prior + float(some.log_evidence(some.deviation[:, np.newaxis], freedom)[0])
+        evidence = float(some.log_evidence(some.deviation[:, np.newaxis], freedom)[0])
+        return self._replace(null=some, log_weight=self.log_prior + evidence)
 
 
 class ModelSpace:
@@ -176,6 +179,7 @@ class ModelSpace:
         freedom: float,
     ) -> None:
         self.explanations, self.discrepancy, self.freedom = explanations, discrepancy, freedom
+        self.weighed = weighed
         self.nature = [one for one in weighed if not one.sizes.is_beyond_nature]
         self.beyond = [one for one in weighed if one.sizes.is_beyond_nature]
         self.evidences = [EffectEvidence(one.null, explanations, freedom) for one in self.nature]
@@ -183,6 +187,15 @@ class ModelSpace:
         self.log_null = float(np.logaddexp.reduce(log_weights))
         # Posterior probability of each of nature's sizes if nothing is missing.
         self.share = np.exp(np.array(log_weights) - self.log_null)
+
+    def select(self, rows: np.ndarray) -> 'ModelSpace':
+        """What may be missing by some readings (P,) only."""
+        return ModelSpace(
+            [one.select(rows, self.freedom) for one in self.weighed],
+            [explanation.select(rows) for explanation in self.explanations],
+            self.discrepancy.select(rows),
+            self.freedom,
+        )
 
     @property
     def best(self) -> WeightedNull:
@@ -210,6 +223,15 @@ class ModelSpace:
     def by_law(self, cause: str) -> Effect:
         """An effect in its best shape with the amplitudes that it has if nothing else acts."""
         return max((evidence.by_law(cause) for evidence in self.evidences), key=lambda e: e[0])[1]
+
+    def p_values(self, seed: int) -> tuple[float, float]:
+        """Probabilities of so much evidence for a cause, and of so large fields on the parts.
+
+        Two tests are made, each with its share of the significance level (Bonferroni).
+        """
+        of_causes = self.p_value(seed) / OF_CAUSES
+        of_size = self.p_value_of_size(seed) / (1.0 - OF_CAUSES)
+        return min(1.0, of_causes), min(1.0, of_size)
 
     def p_value(self, seed: int) -> float:
         """Probability of at least this much evidence for any cause if none acted.

@@ -29,6 +29,7 @@ from paint_deposition.inference.diagnosis.learning import (
     locate_unexplained,
     nulls_around,
 )
+from paint_deposition.inference.diagnosis.model_space import ALPHA
 from paint_deposition.inference.diagnosis.proposals import testability
 from paint_deposition.inference.diagnosis.search import EffectSet, Group, Search, SearchStage
 from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
@@ -38,8 +39,6 @@ from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
 
-# Significance level of the test that something is missing.
-ALPHA = 0.05
 # The model is not good enough where it misses the readings, beyond gauge and texture, by this part
 # of the thickest film: measured sprays of one setting differ by 0.5 to 5 %.
 MOST_BEYOND = 0.03
@@ -73,11 +72,11 @@ def diagnose(
     nothing = search.nothing
     testable = testability(nothing.space.central, seed)
     state = replace(state, testable=testable, figures=nothing.space.figures)
-    p_value = nothing.p_value
+    p_value = min(nothing.p_values)
     if p_value >= ALPHA:
         return _nothing_missing(state, nothing, p_value)
     progress('refitting with what may be missing')
-    sought = nothing.p_value_of_causes < ALPHA
+    sought = nothing.p_values[0] < ALPHA
     stages = search.stages() if sought else [SearchStage(nothing, [])]
     best, groups = search.groups(stages[-1].here)
     state = replace(state, amplitude_sizes=best.fit.parameters.amplitude_sizes)
@@ -88,9 +87,9 @@ def diagnose(
         *of_places(state.study, fit.model),
         *of_footprint(state.study, fit, worth=-np.inf),
     ]
-    left_out = LeftOut(stages, best, options)
+    left_out = LeftOut(nothing, stages, best, options)
     state = replace(state, figures=best.space.figures, discrepancy=best.best.null.discrepancy)
-    state = _accept(state, fit, groups, float(left_out.errors_um()[0]))
+    state = _accept(state, fit, groups, left_out.error_um())
     progress('learning what the laws leave unexplained')
     state = _learn(state, best, left_out)
     return _conclude(state, best, _others(state, search.beside(best)), p_value)
@@ -100,7 +99,8 @@ def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) 
     """The verdict where the test finds nothing; a footprint may still differ from eq. (1)."""
     first, noise_um = state.history[0], state.study.noise_floor_um
     options = of_footprint(state.study, state.fit)
-    state = _learn(state, nothing, LeftOut([SearchStage(nothing, [])], nothing, options))
+    left_out = LeftOut(nothing, [SearchStage(nothing, [])], nothing, options)
+    state = _learn(state, nothing, left_out)
     beyond_um = beyond_noise_um(state.history[-1].rmse_um, noise_um)
     share = beyond_um / float(np.max(state.fit.predicted_um))
     beyond = (

@@ -26,8 +26,7 @@ from paint_deposition.inference.diagnosis.learning import (
     nulls_around,
     of_readings,
 )
-from paint_deposition.inference.diagnosis.model_space import SIZES, SURE, inclusion_of
-from paint_deposition.inference.diagnosis.procedure import ALPHA
+from paint_deposition.inference.diagnosis.model_space import ALPHA, SIZES, SURE, inclusion_of
 from paint_deposition.inference.diagnosis.search import EffectSet, Search
 from paint_deposition.inference.diagnosis.smooth_laws import bases_over
 from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
@@ -71,7 +70,7 @@ def refit(
     search = Search(state)
     nothing = search.nothing
     state = _beside(state, nothing)
-    p_value = nothing.p_value
+    p_value = min(nothing.p_values)
     missing = p_value < ALPHA
     if added is None:
         reason = 'The model was fitted as it is'

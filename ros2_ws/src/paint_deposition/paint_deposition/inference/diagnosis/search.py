@@ -45,8 +45,6 @@ from paint_deposition.inference.fitting.least_squares import Fit
 TRIALS = 5
 # Around so many of the single effects that fit best another pattern and a second effect are tried.
 LEADING = 3
-# Share of the significance level that the test for causes has.
-OF_CAUSES = 0.95
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
 # Log evidence of an effect beyond which the pattern that was fitted without it is no guide.
@@ -117,18 +115,9 @@ class EffectSet:
         return max(nature, key=lambda one: one.log_weight)
 
     @cached_property
-    def p_value_of_causes(self) -> float:
-        """Probability of at least this much evidence for any cause if none acted beside it."""
-        return min(1.0, self.space.p_value(self.state.seed) / OF_CAUSES)
-
-    @property
-    def p_value(self) -> float:
-        """Probability of so much evidence, or of larger fields on the parts than usual ones.
-
-        Two tests are made, each with its share of the significance level (Bonferroni).
-        """
-        of_size = self.space.p_value_of_size(self.state.seed) / (1.0 - OF_CAUSES)
-        return min(self.p_value_of_causes, of_size)
+    def p_values(self) -> tuple[float, float]:
+        """Of causes, and of fields on the parts, if nothing acted; see ``ModelSpace``."""
+        return self.space.p_values(self.state.seed)
 
     @cached_property
     def log_weight(self) -> float:
@@ -178,7 +167,7 @@ class EffectSet:
         The laws may be off in every way.
         """
         there = [one for one in self.weighed if one.sizes == self.best.sizes]
-        weights = [one.log_weight_of(rows, self.state.freedom) for one in there]
+        weights = [one.select(rows, self.state.freedom).log_weight for one in there]
         evidence = float(np.logaddexp.reduce(weights))
         return evidence + gain_of_sizes(self.fit, self.names) + self.log_prior
 
@@ -222,7 +211,9 @@ class Search:
         if names not in self._tried:
             self._tried.add(names)
             effects = parent.effects | {name: parent.space.by_law(name)}
-            self._refitted(effects, parent, self._patterns)
+            # A set that is there was fitted from these patterns.
+            others = () if names in self._trials else self._patterns
+            self._refitted(effects, parent, others)
         return self._trials[names]
 
     def without(self, trial: EffectSet, *names: str) -> EffectSet:

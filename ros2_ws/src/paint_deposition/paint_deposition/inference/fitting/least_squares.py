@@ -19,6 +19,8 @@ from paint_deposition.kernel.eq2_flux import BY_COS, BY_SIN, CENTRED, EVEN, TERM
 
 # Steps of the finite differences by effects, in the vector's units.
 STEP = 1e-3
+# Patterns whose shapes differ by less, in standard deviations of the prior, are one start.
+APART = 0.3
 
 # For functions: BLAS has one thread while they run. Threads that share matrices as small as those
 # of a fit mostly wait for each other, on a busy machine ten times as long as the work takes.
@@ -116,7 +118,9 @@ def fit_readings(
     if starts > 1:
         candidates += _best_starts(problem, first, starts - 1, seed)
     for other in others:
-        candidates.append(parameters.encode(parameters.start.with_patterns(other.patterns)))
+        start = parameters.encode(parameters.start.with_patterns(other.patterns))
+        if all(problem.are_apart(start, one) for one in candidates):
+            candidates.append(start)
     if len(candidates) > 1:
         # A few steps from each start; the best are refined.
         rough = [problem.search(start, 6) for start in candidates]
@@ -171,11 +175,7 @@ def _best_starts(
     For given r, sigma1 and sigma2 the film is linear in the gains of ring, centre and asymmetry,
     so that only these three need be searched (variable projection, Golub and Pereyra 1973).
     """
-    shape = [
-        k for k, entry in enumerate(problem.parameters.pattern.coordinates)
-        if entry.name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
-    ]  # fmt: skip
-    width = problem.prior.width
+    shape, width = problem.shape, problem.prior.width
     # Eight candidate shapes of the pattern for each start.
     spread = ndtri(qmc.Halton(len(shape), seed=seed).random(8 * count))
     tried = []
@@ -226,6 +226,16 @@ class _Problem:
         self.prior = parameters.prior
         self.low, self.high = parameters.bounds
         self._last: tuple[bytes, Terms] | None = None
+        # Entries of the pattern's shape; its gains are found from anywhere.
+        self.shape = [
+            k for k, entry in enumerate(parameters.pattern.coordinates)
+            if entry.name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
+        ]  # fmt: skip
+
+    def are_apart(self, one: np.ndarray, other: np.ndarray) -> bool:
+        """Whether the patterns of two vectors have shapes that may lead to different fits."""
+        away = (one - other)[self.shape] / self.prior.width[self.shape]
+        return bool(np.abs(away).max() > APART)
 
     def terms(self, vector: np.ndarray) -> Terms:
         key = vector.tobytes()
