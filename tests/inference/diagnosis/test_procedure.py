@@ -11,8 +11,7 @@ from inference.diagnosis.readings_on_door import DOOR, SHIELDED
 from inference.fitting.panels import ORDERS, gauged, reading
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.files.atomic import json_text
-from paint_deposition.inference.diagnosis.model_space import SURE
-from paint_deposition.inference.diagnosis.model_space import ALPHA
+from paint_deposition.inference.diagnosis.model_space import ALPHA, SURE
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import percent

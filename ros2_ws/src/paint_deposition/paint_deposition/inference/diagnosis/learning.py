@@ -182,9 +182,7 @@ class LeftOut:
                 kept = count
         return kept
 
-    def error_um(
-        self, laws: Sequence[Sized] = (), without: frozenset[str] = frozenset()
-    ) -> float:
+    def error_um(self, laws: Sequence[Sized] = (), without: frozenset[str] = frozenset()) -> float:
         """On each part left out with what the other parts lead to [um].
 
         With as many of some laws as they bear out; with nothing at all where their test finds
