@@ -245,8 +245,8 @@ def _warnings(
     # Above this the gauge's noise does not explain the residuals.
     if squares > 2.0:
         warnings.append(
-            f'residuals are {np.sqrt(squares):.1f} times the noise of the gauge: '
-            'something is missing from the model; find it with paint diagnose, and plan with its model'
+            f'residuals are {np.sqrt(squares):.1f} times the noise of the gauge: something is '
+            'missing from the model; find it with paint diagnose, and plan with its model'
         )
     away = np.abs(study.residuals(fit.predicted_um).residual_um) / study.sigma_um
     far = np.flatnonzero(away > OUTLIER_SIGMAS)
