@@ -146,6 +146,11 @@ def line_of(token: Token) -> int:
     return token.line or 0
 
 
+def name_of(node: object) -> str:
+    """The name that an argument consists of, '' if it is an expression."""
+    return str(node.children[0]) if isinstance(node, Node) and node.rule == 'reference' else ''
+
+
 @cache
 def _grammar() -> Lark:
     text = Path(__file__).with_name('rapid.lark').read_text(encoding='utf-8')
