@@ -170,7 +170,7 @@ class AtomizerSource(PaintNode):
         positions_by_name = dict(zip(message.name, message.position, strict=False))
         try:
             found = robot.recorded_joints(positions_by_name, topic)
-            values = np.array([[found[name] for name in robot.moving_joints]])
+            values = np.array([[found[name] for name in robot.arm.joints]])
             if not np.isfinite(values).all():
                 raise RecordingError(f'{topic} has joints that are not finite')
             positions, quaternions = robot.poses(robot.in_si(values, topic))
