@@ -177,17 +177,16 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
         total=size, unit='B', unit_scale=True, desc='recover', delay=SHOW_PROGRESS_AFTER_S,
         disable=None,
     ) as bar:  # fmt: skip
-        found = recover(run, output, on_bytes=bar.update)
+        found, lost = recover(run, output, on_bytes=bar.update)
     figures = {
         'folder': str(found.folder), 'messages': found.message_count, 'topics': found.counts,
-        'damaged_chunks': found.damaged_chunks, 'breaks': found.breaks,
-        'skipped_topics': found.skipped_topics, 'provenance': origin(files={'recording': run}),
+        **lost, 'provenance': origin(files={'recording': run}),
     }  # fmt: skip
-    lines = [*found.breaks]
-    if found.damaged_chunks:
-        lines.append(f'{found.damaged_chunks} damaged chunks left out')
-    if found.skipped_topics:
-        lines.append(f'left out, not CDR or without a schema: {" ".join(found.skipped_topics)}')
+    lines = [*lost['breaks']]
+    if count := lost['damaged_chunks']:
+        lines.append(f'{count} damaged chunks left out')
+    if topics := lost['skipped_topics']:
+        lines.append(f'left out, not CDR or without a schema: {" ".join(topics)}')
     lines += [f'{count:10d}  {topic}' for topic, count in found.counts.items()]
     lines.append(f'{found.message_count} messages recovered: {found.folder}')
     click.echo(json_text(figures) if as_json else '\n'.join(lines))
