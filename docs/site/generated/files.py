@@ -13,7 +13,6 @@ from pydantic import BaseModel
 from generated.markdown import table
 from paint_deposition.batch.sweep_file import Passes, Sample, SweepFile
 from paint_deposition.files import campaign_coats, campaign_file, model_file
-from paint_deposition.files.motion_files import MotionSource
 from paint_deposition.files.tables.gauge_formats import (
     ALIASES,
     FOLDERS,
@@ -24,9 +23,9 @@ from paint_deposition.files.tables.gauge_formats import (
 )
 from paint_deposition.files.zones_file import ZoneEntry
 from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
-from paint_deposition.request import OnePart, range_end
+from paint_deposition.request import MotionOptions, OnePart, range_end
 
-MOTION = set(MotionSource.model_fields)
+MOTION = set(MotionOptions.model_fields)
 PART = set(OnePart.model_fields)
 # Keys that were explained before, in the order of the file.
 TARGET = ['target_um', 'tolerance_um']
@@ -58,7 +57,7 @@ def text() -> str:
         _keys(campaign_coats.CoatEntry, without=MOTION.union(COAT)),
         '## Zones\n', 'Each of the list `zones`, see [zones](zones.md).\n', _keys(ZoneEntry),
         '## A motion\n', 'How a recording is read; for commands the same as options.\n',
-        _keys(MotionSource),
+        _keys(MotionOptions),
         '## A part\n', _keys(OnePart),
         '## Gauge readings\n', f'Own columns: {own}. Other headings, without accents:\n',
         table(('column', 'headings'), aliases),

@@ -16,12 +16,18 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import BatchError, did_you_mean
 from paint_deposition.files.atomic import read_yaml
-from paint_deposition.files.motion_files import MotionSource
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.transforms import POSE_FORMAT, is_pose
-from paint_deposition.request import Number, OnePart, Text, validate
+from paint_deposition.request import (
+    POSE_FORMAT,
+    MotionOptions,
+    Number,
+    OnePart,
+    Text,
+    is_pose,
+    validate,
+)
 
 INPUTS = ('mesh', 'trajectory', 'model')
 # Of passes that are planned, and of a recording as it was.
@@ -105,7 +111,7 @@ class Passes(BaseModel, extra='forbid'):
     one_way: bool = Field(False, description='whether all passes run one way')
 
 
-class SweepFile(MotionSource, OnePart, extra='forbid'):
+class SweepFile(MotionOptions, OnePart, extra='forbid'):
     """A sweep as it is written; paths are relative to the file."""
 
     mesh: Text | None = Field(None, description='the name of a mesh file')

@@ -15,6 +15,7 @@ from paint_deposition.cli.results import print_all, progress
 from paint_deposition.errors import some
 from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
+from paint_deposition.request import MotionOptions, validate
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.bag_files import BagTopic
@@ -107,16 +108,15 @@ def _contents(
     """What a module, table, mesh or bag holds."""
     from paint_deposition.errors import RecordingError
     from paint_deposition.files.meshes import SUFFIXES
-    from paint_deposition.files.motion_files import MOTION_KINDS, MotionSource, read_table
+    from paint_deposition.files.motion_files import MOTION_KINDS, read_table, require_kind
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_files import open_bag
     from paint_deposition.files.recordings.bags import BOOL_TYPE
     from paint_deposition.files.recordings.messages import STATE_TYPE
     from paint_deposition.files.recordings.pose_topics import sources_of_poses
     from paint_deposition.files.tables.poses import holds_readings, is_pose_table
-    from paint_deposition.request import validate
 
-    source = validate(MotionSource, 'motion', motion, RecordingError)
+    source = validate(MotionOptions, 'motion', motion, RecordingError)
     if path.suffix.lower() in SUFFIXES:
         _only('a mesh', 'mesh_scale', 'body')
         return _mesh_contents(path, part)
@@ -129,7 +129,7 @@ def _contents(
         print_all('warning', poses.warnings)
         return _table_contents(poses, max_pose_gap_s)
     kind = 'a RAPID module' if is_rapid(path) else 'a bag'
-    source.require_kind(path, kind)
+    require_kind(source, path, kind)
     if is_rapid(path):
         _only(kind, 'gun_signal', 'procedure')
         program = read_program(path, source.gun_signal, source.procedure)

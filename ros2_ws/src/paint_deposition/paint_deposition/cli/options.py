@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 
 import paint_deposition as pd
 from paint_deposition.errors import PaintError
-from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request
+from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request, is_pose
 
 Decorator = Callable[[Callable], Callable]
 
@@ -185,8 +185,6 @@ def _type(annotation: Any, metadata: list[Any], shown: Callable[[Any], Any]) -> 
 def _pose(ctx: click.Context, param: click.Parameter, given: tuple | None) -> list[float] | None:
     if given is None:
         return None
-    from paint_deposition.motion.transforms import is_pose
-
     if not is_pose(given):
         words = f'the quaternion qx qy qz qw has the norm {math.hypot(*given[3:]):.4g}, not 1'
         raise click.BadParameter(words, ctx, param)

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError, quoted
 from paint_deposition.files.rapid.parser import Datum, Module, Node, Routine
-from paint_deposition.motion.transforms import QUATERNION_TOLERANCE
+from paint_deposition.request import QUATERNION_TOLERANCE
 
 # Of one array, and of all lists that are made or copied while a program runs.
 MOST_ELEMENTS, MOST_COPIED = 1_000_000, 10_000_000

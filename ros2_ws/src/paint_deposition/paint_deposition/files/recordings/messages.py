@@ -17,7 +17,7 @@ from rosbags.typesys.store import Typestore
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.pose_stream import FARTHEST_M, TriggerChange
 from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
-from paint_deposition.motion.transforms import is_pose
+from paint_deposition.request import is_pose
 
 SEPARATOR = '=' * 80
 # Definitions of the messages that are serialised without a ROS installation.

@@ -22,6 +22,7 @@ from paint_deposition.files.tables.headings import (
 )
 from paint_deposition.files.tables.sheets import text_of
 from paint_deposition.files.tables.table import Table
+from paint_deposition.request import CONVENTIONS, ROTATION_WORDS
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
@@ -177,15 +178,6 @@ ANGLE_COLUMNS = (
     (('phi', 'theta', 'psi'), '', False), (('e1', 'e2', 'e3'), '', False),
     (('o', 'a', 't'), '', False),
 )  # fmt: skip
-# Makers' conventions in the letters of scipy: capital letters turn about the axes of the tool as
-# it goes, small ones about those of the world.
-CONVENTIONS = {
-    'kuka': 'ZYX', 'abb': 'ZYX', 'fanuc': 'xyz', 'rpy': 'xyz', 'staubli': 'XYZ', 'kawasaki': 'ZYZ',
-}  # fmt: skip
-ROTATION_WORDS = (
-    "'rotvec' for a rotation vector, three letters for Euler angles (ZYX about the axes of the "
-    'tool, xyz about fixed axes), or kuka, abb, fanuc, rpy, staubli, kawasaki'
-)
 
 
 def read_rotations(
