@@ -79,10 +79,18 @@ def compute(
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
+    from filelock import FileLock, Timeout
 
+    folder.mkdir(parents=True, exist_ok=True)
+    try:  # the system frees it when a command dies
+        alone = FileLock(folder / '.lock', timeout=0).acquire()
+    except Timeout:
+        raise BatchError(
+            f'{folder} is in use by another command; wait for it, or choose another --output'
+        ) from None
     files = {case.digest: folder / f'{case.digest}.parquet' for case in cases}
     failures = {}
-    with _used_alone(folder):
+    with alone:
         left = {c.digest: c for c in cases if not files[c.digest].is_file()}
         done = len(cases) - len(left)
         for digest, future in finished(work, left, inputs, executor) if left else ():
@@ -178,21 +186,6 @@ def code_digest() -> str:
         digest.update(str(file.relative_to(package)).encode())
         digest.update(file.read_bytes())
     return digest.hexdigest()[:32]
-
-
-@contextmanager
-def _used_alone(folder: Path) -> Iterator[None]:
-    """Refuse a folder that another command uses; the system frees it when a command dies."""
-    from filelock import FileLock, Timeout
-
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        with FileLock(folder / '.lock', timeout=0):
-            yield
-    except Timeout:
-        raise BatchError(
-            f'{folder} is in use by another command; wait for it, or choose another --output'
-        ) from None
 
 
 def finished(

@@ -27,12 +27,9 @@ Contents = tuple[dict[str, Any], list[str]]
 
 
 @click.command('inspect')
-@click.argument('recording', type=options.FILE, required=False)
+@click.argument('recording', type=options.FILE)
 @options.POINTS
 @options.part_options(0.02, required=False)
-@click.option(
-    '--trajectory', type=options.FILE, help='The motion to set beside the part; or RECORDING.'
-)
 @click.option(
     '--out', '--output', '-o', 'output', type=options.FILE,
     help='Picture to draw, PNG: part, passes and tool axes from three sides.',
@@ -43,10 +40,9 @@ Contents = tuple[dict[str, Any], list[str]]
 @options.ALLOW_EFFECTS
 @options.JSON
 def inspect_command(
-    recording: Path | None,
+    recording: Path,
     points_file: Path | None,
     part: options.Part,
-    trajectory: Path | None,
     output: Path | None,
     model_file: Path | None,
     motion: dict[str, Any],
@@ -63,30 +59,27 @@ def inspect_command(
     With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
     part, and warnings of what is odd, each with its likely cause.
     """
-    path = trajectory or recording
-    if path is None or (trajectory and recording):
-        raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
     if part.mesh is None:
-        model, files = None, {'recording': str(path)}
-        figures, lines = _contents(path, points_file, part, motion, max_pose_gap_s)
+        model, files = None, {'recording': str(recording)}
+        figures, lines = _contents(recording, points_file, part, motion, max_pose_gap_s)
     elif points_file:
         raise click.UsageError('--points is for gauge readings; leave it or --mesh out')
     else:
         with progress('inspect') as show:
             show('reading')
-            recorded = pd.read_recording(path, **motion)
-            model = model_for(model_file, path)[0].model
-            seen = pd.look_at(part.surface(), recorded, model, max_pose_gap_s=max_pose_gap_s)
+            poses = pd.read_recording(recording, **motion)
+            model = model_for(model_file, recording)[0].model
+            seen = pd.look_at(part.surface(), poses, model, max_pose_gap_s=max_pose_gap_s)
             if output is not None:
                 from paint_deposition.report.plan_pictures import write_geometry_picture
 
                 show('drawing')
-                title = f'{path.name} over {part.mesh.name}'
+                title = f'{recording.name} over {part.mesh.name}'
                 write_geometry_picture(output, seen.surface, seen.path, seen.geometry, title)
         print_all('note', seen.notes)
         print_all('warning', [*seen.trajectory.warnings, *seen.geometry.warnings])
-        files = {'mesh': str(part.mesh), 'trajectory': str(path)}
-        told = {'mesh_file': str(part.mesh), 'trajectory': str(path), 'picture': output}
+        files = {'mesh': str(part.mesh), 'trajectory': str(recording)}
+        told = {'mesh_file': str(part.mesh), 'trajectory': str(recording), 'picture': output}
         figures, lines = seen.to_dict() | told, [seen.geometry.sentence]
         lines += [seen.geometry.facet_sentence, *([f'  {output}'] if output else [])]
     if as_json:  # the digests of long recordings take their time
@@ -96,7 +89,7 @@ def inspect_command(
 
 def _only(what: str, *names: str) -> None:
     """Refuse the options that were given and do nothing for what is shown; these do something."""
-    given = options.given_beside(*names, 'recording', 'trajectory', 'as_json', 'allow_effects')
+    given = options.given_beside(*names, 'recording', 'as_json', 'allow_effects')
     if given:
         raise click.UsageError(f'{" ".join(given)}: not for {what}; leave it out, or give --mesh')
 
@@ -140,7 +133,13 @@ def _contents(
     triggers = [t.name for kind in (STATE_TYPE, BOOL_TYPE) for t in topics if t.type == kind]
     figures = {
         'path': str(path), 'topics': [asdict(topic) for topic in topics],
-        'pose_streams': [source.to_dict() for source in sources], 'triggers': triggers,
+        'pose_streams': [
+            {name: value for name, value in vars(source).items() if name != 'quality'}
+            | (vars(source.quality) if source.quality else {})
+            | {'will_do': source.quality is not None}
+            for source in sources
+        ],
+        'triggers': triggers,
     }  # fmt: skip
     return figures, _bag_lines(path, topics, sources, triggers)
 

@@ -176,16 +176,14 @@ def _read_bag(bag: Bag, source: MotionOptions, gun: str) -> Trajectory:
     robot = _robot(bag.path, source)
     if robot and source.tf:
         raise RecordingError(f'{bag.path}: both tf and urdf are given; leave one of them out')
-    how = source.tf, robot, source.pose_unit
+    poses, trigger, notes = source.pose_topic, source.state_topic, ()
     if gun:
         state = bag.find(f'/{gun}{STATE_TOPIC}')
-        trigger = state.name if state else None
-        return trajectory_of(bag, f'/{gun}{POSE_TOPIC}', trigger, *how)
-    # The bag of a plan names its trigger itself.
-    planned = None if source.state_topic else bag.custom_data.get(TRIGGER)
-    trigger = source.state_topic or planned
-    recorded = trajectory_of(bag, source.pose_topic, trigger, *how)
-    notes = (f'a plan: its trigger {planned} is used',) if planned else ()
+        poses, trigger = f'/{gun}{POSE_TOPIC}', state.name if state else None
+    elif not trigger and (trigger := bag.custom_data.get(TRIGGER)):
+        # The bag of a plan names its trigger itself.
+        notes = (f'a plan: its trigger {trigger} is used',)
+    recorded = trajectory_of(bag, poses, trigger, source.tf, robot, source.pose_unit)
     return replace(recorded, notes=(*recorded.notes, *notes))
 
 

@@ -116,10 +116,7 @@ def _records(file: Path, lost: Lost, on_bytes: Callable[[int], None]) -> Iterato
         reader = StreamReader(stream, emit_chunks=True, record_size_limit=size)
         try:
             for record in reader.records:
-                if isinstance(record, Chunk):
-                    yield from _chunk_records(record, lost)
-                else:
-                    yield record
+                yield from _chunk_records(record, lost) if isinstance(record, Chunk) else [record]
                 if isinstance(record, Footer):
                     return
                 on_bytes(stream.tell() - start)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -104,10 +105,10 @@ def read_pose_table(
 
 def _motion(table: Table, robot: 'Robot | None', options: MotionOptions) -> Trajectory:
     """The poses with their times or speeds, and with what switches the gun."""
-    flows, by_trigger = _flows(table, options.state_topic)
+    flows, by_trigger, warnings = _flows(table, options.state_topic)
     brushes, by_brush = _brushes(table)
     if flows is None and brushes.any():
-        flows = np.ones(len(brushes))
+        flows, warnings = np.ones(len(brushes)), ()
     # Beside o and a, the letter t is an angle of Kawasaki's.
     times = TIME[:-1] if find(table, 'o') is not None and find(table, 'a') is not None else TIME
     time, speed = find(table, *times), None if robot else find(table, *SPEED)
@@ -127,7 +128,6 @@ def _motion(table: Table, robot: 'Robot | None', options: MotionOptions) -> Traj
         poses = Trajectory(stamps, positions, quaternions, _frame(table))
         how = f'{len(table)} poses: x y z in {its_unit}; {its_rotation}'
     note = f'{how}; {by_trigger}{by_brush}'
-    warnings = () if flows is not None else _could_be_trigger(table)
     if time is None and speed is not None:
         programmed = timed(_moves(table, poses, speed, flows, brushes), flows is not None)
         return replace(
@@ -143,7 +143,7 @@ def _motion(table: Table, robot: 'Robot | None', options: MotionOptions) -> Traj
         poses,
         trigger_stamps_ns=stamps,
         trigger_flow=flows,
-        trigger_brush=np.array(brushes, np.int64),
+        trigger_brush=brushes,
     )
 
 
@@ -192,8 +192,8 @@ def _positions_m(table: Table, given: str | None) -> tuple[np.ndarray, str]:
     return positions, unit or 'm (no unit is given)'
 
 
-def _flows(table: Table, name: str | None) -> tuple[np.ndarray | None, str]:
-    """Flow (N,) from each row on, relative to the calibrated one, and how it was read."""
+def _flows(table: Table, name: str | None) -> tuple[np.ndarray | None, str, tuple[str, ...]]:
+    """Flow (N,) from each row on, relative to the calibrated one, how it was read, warnings."""
     texts = [heading.text for heading in table.headings]
     if name is None:
         trigger, flow = find(table, *TRIGGER), find(table, *FLOW)
@@ -204,7 +204,13 @@ def _flows(table: Table, name: str | None) -> tuple[np.ndarray | None, str]:
     else:
         raise RecordingError(f'no column is called {name}; {did_you_mean(name, texts)}')
     if trigger is None and flow is None:
-        return None, 'no trigger, the gun sprays throughout'
+        each = [{its.lower() for its in table.texts(k)} for k in range(len(texts))]
+        switched = [len(its) > 1 and its <= {'0', '1', *SWITCHED} for its in each]
+        doubts: tuple[str, ...] = ()
+        if named := ', '.join(filter(None, compress(texts, switched))):
+            doubt = f'the gun counts as always on; if {named} is its trigger'
+            doubts = (f'{doubt}, give --trigger NAME',)
+        return None, 'no trigger, the gun sprays throughout', doubts
     if flow is not None and units_of(table, [flow]) != {''}:
         raise RecordingError(
             f'{table.written([flow])}: the flow is relative to the calibrated one, 1 for the '
@@ -215,20 +221,7 @@ def _flows(table: Table, name: str | None) -> tuple[np.ndarray | None, str]:
     on = np.nan_to_num(values[:, 0]) != 0.0
     relative = values[:, -1] if flow is not None else np.full(len(on), np.nan)
     flows = [relative_flow(bool(a), float(b)) for a, b in zip(on, relative, strict=True)]
-    return np.array(flows), f'gun by {table.written(used)}'
-
-
-def _could_be_trigger(table: Table) -> tuple[str, ...]:
-    """A warning of columns that say on and off and are not used, if there are any."""
-    columns = []
-    for column, heading in enumerate(table.headings):
-        seen = {text.lower() for text in table.texts(column)}
-        if len(seen) > 1 and seen <= {'0', '1', *SWITCHED}:
-            columns.append(heading.text)
-    named = ', '.join(filter(None, columns))
-    if not named:
-        return ()
-    return (f'the gun counts as always on; if {named} is its trigger, give --trigger NAME',)
+    return np.array(flows), f'gun by {table.written(used)}', ()
 
 
 def _brushes(table: Table) -> tuple[np.ndarray, str]:
