@@ -84,7 +84,7 @@ class Interpreter(Values):
         self.only_options(routine.name, options, optional)
         given = dict(zip(needed, values, strict=True)) | options
         own = {
-            one.name: Datum(one.name, one.type, self.value(given[one.name]))
+            one.name: replace(one, value=self.value(given[one.name]))
             for one in routine.parameters if one.name in given
         }  # fmt: skip
         caller, result = (self._local, self.source, self.line, self._running), None
