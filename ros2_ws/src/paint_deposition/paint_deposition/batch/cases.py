@@ -231,10 +231,8 @@ def _run_case(code: str, work: Callable[..., Any], parameters: bytes, *inputs: b
     return work(pickle.loads(parameters), *map(_deserialised, inputs))
 
 
-@lru_cache(maxsize=8)  # inputs that a worker keeps in memory
-def _deserialised(content: bytes) -> Any:
-    """An input; what it caches, such as a search tree, serves the next case too."""
-    return pickle.loads(content)
+# The inputs that a worker keeps: what one caches, such as a search tree, serves the next case too.
+_deserialised = lru_cache(maxsize=8)(pickle.loads)
 
 
 def _serialised(value: Any) -> bytes:

@@ -176,7 +176,7 @@ def _read_bag(bag: Bag, source: MotionOptions, gun: str) -> Trajectory:
     robot = _robot(bag.path, source)
     if robot and source.tf:
         raise RecordingError(f'{bag.path}: both tf and urdf are given; leave one of them out')
-    poses, trigger, notes = source.pose_topic, source.state_topic, ()
+    poses, trigger, notes = source.pose_topic, source.state_topic, tuple[str, ...]()
     if gun:
         state = bag.find(f'/{gun}{STATE_TOPIC}')
         poses, trigger = f'/{gun}{POSE_TOPIC}', state.name if state else None

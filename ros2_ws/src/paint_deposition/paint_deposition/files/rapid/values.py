@@ -7,6 +7,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -111,22 +112,18 @@ def _pose_mult(first: list, second: list) -> list:
     return [position.tolist(), rotation.as_quat(scalar_first=True).tolist()]
 
 
-def _of_vectors(calculate: Callable) -> Callable:
-    """An operator that takes positions too."""
-
-    def calculated(a: Any, b: Any) -> Any:
-        if not (isinstance(a, list) or isinstance(b, list)):
-            return calculate(a, b)
-        if isinstance(a, list) and isinstance(b, list) and np.shape(a) != np.shape(b):
-            raise ValueError('they have not the same size')
-        return calculate(np.array(a), np.array(b)).tolist()
-
-    return calculated
+def _of_positions(calculate: Callable, a: Any, b: Any) -> Any:
+    """What an operator gives that takes positions too."""
+    if not (isinstance(a, list) or isinstance(b, list)):
+        return calculate(a, b)
+    if isinstance(a, list) and isinstance(b, list) and np.shape(a) != np.shape(b):
+        raise ValueError('they have not the same size')
+    return calculate(np.array(a), np.array(b)).tolist()
 
 
 OPERATORS: dict[str, Callable] = {
-    '+': _of_vectors(operator.add), '-': _of_vectors(operator.sub),
-    '*': _of_vectors(operator.mul), '/': operator.truediv,
+    '+': partial(_of_positions, operator.add), '-': partial(_of_positions, operator.sub),
+    '*': partial(_of_positions, operator.mul), '/': operator.truediv,
     'div': lambda a, b: float(math.trunc(a / b)), 'mod': math.fmod,
     '=': operator.eq, '<>': operator.ne, '<': operator.lt, '>': operator.gt,
     '<=': operator.le, '>=': operator.ge,
