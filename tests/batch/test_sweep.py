@@ -260,18 +260,11 @@ def test_a_model_is_varied_and_its_bounds_hold():
         sweep_file.varied_model(DepositionModel(), {'planar.K2': 1.5})
     with pytest.raises(BatchError, match="the model has no effect 'sag'; it has: none"):
         sweep_file.varied_model(DepositionModel(), {'effects': ['sag']})
-
-
-def test_a_pattern_of_brushes_is_varied_brush_by_brush():
-    model = DepositionModel(brushes=[Brush(number=k, planar=PlanarPattern()) for k in (1, 4)])
-    file = sweep_file.SweepFile.model_validate({'grid': {'brush_4.K1_cm3_per_s': [2.5]}})
-    (values,) = sweep_file.variations(file, [model])
-    first, other = sweep_file.varied_model(model, values).patterns
-    assert (first, other.K1_cm3_per_s) == (PlanarPattern(), 2.5)
-    with pytest.raises(BatchError, match=r'vary brush_1\.K2 or brush_4\.K2'):
-        sweep_file.varied_model(model, {'planar.K2': 0.2})
-    with pytest.raises(BatchError, match="no effect 'brush_4' is in"):
-        sweep_file.variations(file)
+    brushes = DepositionModel(brushes=[Brush(number=4, planar=PlanarPattern())])
+    with pytest.raises(
+        BatchError, match=r'planar\.K2 varies, but the model has a pattern for each'
+    ):
+        sweep_file.varied_model(brushes, {'planar.K2': 0.2})
 
 
 def test_a_motion_runs_faster_further_off_and_with_more_flow():
