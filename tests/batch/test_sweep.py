@@ -183,7 +183,7 @@ def test_a_users_own_effect_travels_to_processes_that_have_not_its_file(
     assert as_told['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
     assert weaker['mean_um'] < as_told['mean_um']
     file.write_text(OWN.replace('1.0 + ', '1.0 + 1.5 * '))
-    assert Job.of(sweep, DOOR).cases[0].digest != job.cases[0].digest
+    assert Job.of(sweep, DOOR).cases[0][0] != job.cases[0][0]
 
 
 def swept(**told) -> list[dict]:

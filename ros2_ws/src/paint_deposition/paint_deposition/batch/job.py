@@ -81,7 +81,7 @@ class Job:
             model = job._model(values)
             own = [effect.file_content.decode() for effect in model.effects]
             digest = digest_of(code_digest(), model_digest(model), own, options, inputs)
-            job.cases.append(Case(digest, {'model': model, **options}, inputs))
+            job.cases.append((digest, {'model': model, **options}, inputs))
         return job
 
     @property
