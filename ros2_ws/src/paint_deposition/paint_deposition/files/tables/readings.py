@@ -63,6 +63,11 @@ class ReadingTable(Table):
     # What each column of the thickness is a layer of; none where it is not.
     layers: list[str] = field(default_factory=list)
     left_out: str = ''  # what was not taken for a row, for the user
+    # Of a list of points: where they are (N, 3) in the mesh frame [m], outward unit normals, and
+    # that in words.
+    positions_m: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+    normals: np.ndarray | None = None
+    place_words: str = ''
 
     @staticmethod
     def read(
