@@ -129,13 +129,13 @@ def results_options(what: str, default: str | None = None) -> Decorator:
         'into it are removed; other files in it are kept as they are. Nothing is changed before '
         'all results are complete.'
     )
-    each = (
-        click.option('-o', '--output', type=FOLDER, required=default is None, default=default,
-                     help=text),
-        click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png',
-                     show_default=True, help='Format of the pictures.'),
-        JSON,
-    )  # fmt: skip
+    each = {
+        'output': click.option('-o', '--output', type=FOLDER, required=default is None,
+                               default=default, help=text),
+        'pictures': click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']),
+                                 default='png', show_default=True, help='Format of the pictures.'),
+        'as_json': JSON,
+    }  # fmt: skip
     return option_group(each, 'results', Results)
 
 
