@@ -278,7 +278,7 @@ def part_options(
     max_edge_length_m: float, required: bool = True, zones: bool = False
 ) -> Decorator:
     """A command takes the ``Part``."""
-    options = {
+    options: dict[str, Decorator] = {
         'mesh': click.option(
             '--mesh', required=required, type=FILE, help='The part: STL, PLY, OBJ, glTF or STEP.'
         ),
