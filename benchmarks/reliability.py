@@ -164,7 +164,7 @@ def _problem_of_run(way: str, run: Path) -> str:
             return 'told to end, and the run is not complete'
     else:
         try:
-            run = recover(run, run.with_name('recovered')).folder
+            run = recover(run, run.with_name('recovered'))[0].folder
         except PaintError as error:
             # Killed before the first chunk was old enough to be written.
             return '' if 'nothing to recover' in str(error) else str(error)

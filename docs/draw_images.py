@@ -172,8 +172,8 @@ def draw_results() -> None:
         run('measure', '--mesh', SAMPLES / 'measured_door/door.stl', '--trajectory',
               SAMPLES / 'measured_door/door', '-o', folder / 'measure')  # fmt: skip
         keep(Image.open(folder / 'measure/points.png'), 'measure.png')
-        run('inspect', '--mesh', SAMPLES / 'door.stl', '--trajectory',
-              SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
+        run('inspect', SAMPLES / 'door_horizontal', '--mesh', SAMPLES / 'door.stl',
+              '--state-topic', '/atomizer/state',
               '--out', folder / 'inspect.png')  # fmt: skip
         keep(Image.open(folder / 'inspect.png'), 'inspect.png')
         zones = folder / 'zones.yaml'

@@ -15,7 +15,7 @@ import yaml
 import paint_deposition
 from booth import SAMPLES
 from cli.command import assert_refused, paint
-from paint_deposition.batch.cases import Case, compute, workers
+from paint_deposition.batch.cases import compute, workers
 from paint_deposition.batch.job import Job, computed
 from paint_deposition.batch.sweep_file import SweepFile
 from paint_deposition.errors import BatchError
@@ -109,7 +109,7 @@ def test_a_case_that_fails_says_so_and_is_tried_again(tmp_path):
     """`eval` is the work: of columns, of what raises, of what ends its process."""
     texts = {'deadly': "__import__('os')._exit(1)", 'bad': '1 / 0'}
     texts |= {f'good_{number}': FILM for number in range(8)}
-    cases = [Case(name, text) for name, text in texts.items()]
+    cases = [(name, text, ()) for name, text in texts.items()]
     for left in (10, 2):
         table, now = compute(eval, cases, {}, tmp_path, workers(count=2), silent)
         assert now == left
@@ -127,7 +127,7 @@ def test_a_folder_is_of_one_command_at_a_time_and_without_dask_this_process_comp
     tmp_path, monkeypatch
 ):
     monkeypatch.setattr('paint_deposition.batch.cases.find_spec', lambda name: None)
-    given = eval, [Case('good', FILM), Case('again', FILM), Case('good', FILM)], {}, tmp_path
+    given = eval, [(name, FILM, ()) for name in ('good', 'again', 'good')], {}, tmp_path
 
     def second(what: str, share: float) -> None:
         with pytest.raises(BatchError, match='is in use by another command'):

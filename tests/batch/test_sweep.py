@@ -183,7 +183,7 @@ def test_a_users_own_effect_travels_to_processes_that_have_not_its_file(
     assert as_told['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
     assert weaker['mean_um'] < as_told['mean_um']
     file.write_text(OWN.replace('1.0 + ', '1.0 + 1.5 * '))
-    assert Job.of(sweep, DOOR).cases[0].digest != job.cases[0].digest
+    assert Job.of(sweep, DOOR).cases[0][0] != job.cases[0][0]
 
 
 def swept(**told) -> list[dict]:
@@ -260,18 +260,9 @@ def test_a_model_is_varied_and_its_bounds_hold():
         sweep_file.varied_model(DepositionModel(), {'planar.K2': 1.5})
     with pytest.raises(BatchError, match="the model has no effect 'sag'; it has: none"):
         sweep_file.varied_model(DepositionModel(), {'effects': ['sag']})
-
-
-def test_a_pattern_of_brushes_is_varied_brush_by_brush():
-    model = DepositionModel(brushes=[Brush(number=k, planar=PlanarPattern()) for k in (1, 4)])
-    file = sweep_file.SweepFile.model_validate({'grid': {'brush_4.K1_cm3_per_s': [2.5]}})
-    (values,) = sweep_file.variations(file, [model])
-    first, other = sweep_file.varied_model(model, values).patterns
-    assert (first, other.K1_cm3_per_s) == (PlanarPattern(), 2.5)
-    with pytest.raises(BatchError, match=r'vary brush_1\.K2 or brush_4\.K2'):
-        sweep_file.varied_model(model, {'planar.K2': 0.2})
-    with pytest.raises(BatchError, match="no effect 'brush_4' is in"):
-        sweep_file.variations(file)
+    brushes = DepositionModel(brushes=[Brush(number=4, planar=PlanarPattern())])
+    with pytest.raises(BatchError, match='has a pattern for each brush; give a model'):
+        sweep_file.varied_model(brushes, {'planar.K2': 0.2})
 
 
 def test_a_motion_runs_faster_further_off_and_with_more_flow():

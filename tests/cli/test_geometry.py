@@ -130,7 +130,7 @@ def test_a_small_mesh_in_millimetres_is_refused(panel, tmp_path):
 @pytest.mark.slow
 def test_inspect_says_and_draws_how_the_gun_ran_over_the_door(tmp_path):
     door, run, picture = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal', tmp_path / 'door.png'
-    done = ran('inspect', '--mesh', door, '--trajectory', run, *TRIGGER, '--out', picture)
+    done = ran('inspect', run, '--mesh', door, *TRIGGER, '--out', picture)
     assert done.stderr == ''
     assert done.stdout.startswith('3 passes, 0.30 m/s, TCP 249 mm from the surface')
     assert str(picture) in done.stdout

@@ -106,7 +106,7 @@ def jobs(tmp_path_factory):
     (f'refit {CAMPAIGN}', "Missing option '--add'"),
     (f'refit {CAMPAIGN} --add edge_build --as-effect a.py', 'learned:COVARIATE'),
     ('recover nowhere', 'nowhere'), ('inspect nowhere', 'nowhere'),
-    ('inspect', 'RECORDING|--mesh|--trajectory'), ('inspect --mesh door.stl', '--trajectory'),
+    ('inspect', 'RECORDING'),
     ('inspect door_horizontal --out a.png', '--mesh'),
     ('inspect door.stl --tf a b', '--tf: not for a mesh; leave it'),
     ('inspect door.stl --max-edge-length-m 0.1', '--max-edge-length-m: not for a mesh; leave it'),

@@ -17,7 +17,7 @@ from booth import SAMPLES
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
 from files.tables.test_gauge_layouts import LAYOUTS
 from paint_deposition.batch.sweep_file import read_sweep
-from paint_deposition.files.gauge_readings import MeasuringPoints, read_points
+from paint_deposition.files.gauge_readings import read_list, read_points
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.files.provenance import planned_model
 from paint_deposition.files.recordings.bag_files import open_bag
@@ -216,7 +216,7 @@ def targets() -> dict[str, Target]:
             '.json', pd.read_readings, [GAUGE_JSON], '[ ] { } , : " null NaN 1e999 -1 "x": [[ []',
         ),
         'measuring_points': Target(
-            '.csv', lambda path: MeasuringPoints.read(path, Layout(), None), [points], cells
+            '.csv', lambda path: read_list(path, Layout(), None), [points], cells
         ),
         'points': Target('.csv', read_points, [points], cells),
         'poses': Target('.csv', pd.read_recording, [*POSES], cells),

@@ -11,9 +11,9 @@ from paint_deposition.motion.transforms import (
     NoTransform,
     Rigid,
     is_frame,
-    is_pose,
 )
 from paint_deposition.planning.part_places import locate
+from paint_deposition.request import is_pose
 
 
 def random_poses(count: int) -> tuple[np.ndarray, np.ndarray]:

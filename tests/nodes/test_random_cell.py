@@ -254,7 +254,7 @@ class Cell(NodesOfACell):
         assert 'Traceback' not in self.recorder.err
         # Before its first part it may have received nothing, of which nothing is recovered.
         if signal == 'kill' and self.is_whole:
-            run = recover(run, run.with_name(f'{run.name}_recovered')).folder
+            run = recover(run, run.with_name(f'{run.name}_recovered'))[0].folder
         if self.is_whole:
             self.check(run, of)
         self.wait_until(lambda: not self.robot.hearers()[1])

@@ -13,20 +13,18 @@ from pydantic import BaseModel
 from generated.markdown import table
 from paint_deposition.batch.sweep_file import Passes, Sample, SweepFile
 from paint_deposition.files import campaign_coats, campaign_file, model_file
-from paint_deposition.files.motion_files import MotionSource
 from paint_deposition.files.tables.gauge_formats import (
     ALIASES,
     FOLDERS,
     FORMATS,
     LAYERS,
-    LINES,
     OWN,
 )
 from paint_deposition.files.zones_file import ZoneEntry
 from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
-from paint_deposition.request import OnePart, range_end
+from paint_deposition.request import MotionOptions, OnePart, range_end
 
-MOTION = set(MotionSource.model_fields)
+MOTION = set(MotionOptions.model_fields)
 PART = set(OnePart.model_fields)
 # Keys that were explained before, in the order of the file.
 TARGET = ['target_um', 'tolerance_um']
@@ -41,7 +39,7 @@ A model has `planar` or `brushes` by their numbers, `projection`, a list of
 def text() -> str:
     """A section for each file."""
     own = ', '.join(f'`{name}`' for name in OWN.values())
-    layouts = dict.fromkeys([*(one.name for one in FORMATS), *LINES, *FOLDERS])
+    layouts = dict.fromkeys([*(one.name for one in FORMATS), *FOLDERS])
     aliases = [(f'`{name}`', ', '.join(words)) for name, words in ALIASES.items()]
     return '\n'.join([
         '## Model\n',
@@ -58,12 +56,12 @@ def text() -> str:
         _keys(campaign_coats.CoatEntry, without=MOTION.union(COAT)),
         '## Zones\n', 'Each of the list `zones`, see [zones](zones.md).\n', _keys(ZoneEntry),
         '## A motion\n', 'How a recording is read; for commands the same as options.\n',
-        _keys(MotionSource),
+        _keys(MotionOptions),
         '## A part\n', _keys(OnePart),
         '## Gauge readings\n', f'Own columns: {own}. Other headings, without accents:\n',
         table(('column', 'headings'), aliases),
         'Side by side, layers: ' + '; '.join(f'`{n}` {", ".join(w)}' for n, w in LAYERS.items()),
-        f'\nLayouts known by their headings or lines: {"; ".join(layouts)}.\n',
+        f'\nLayouts known by their headings: {"; ".join(layouts)}.\n',
         '## Sweep\n',
         'Also the keys of [a motion](#a-motion) and of [a part](#a-part).\n',
         _keys(SweepFile, without=MOTION.union(PART)),

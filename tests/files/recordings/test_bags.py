@@ -15,7 +15,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_run import RunWriter
-from paint_deposition.files.recordings.messages import STATE_TEXT, STATE_TYPE, Definition, standard
+from paint_deposition.files.recordings.messages import STATE_TEXT, STATE_TYPE, standard
 from paint_deposition.motion.transforms import Rigid
 
 
@@ -48,7 +48,7 @@ def test_every_storage_and_spelling_of_the_topic(tmp_path, storage):
 def test_topics_of_other_types_and_without_messages_are_no_candidates(tmp_path):
     """rosbags cannot parse the events' type; only the types that are read have to be parsed."""
     written, messages = straight_pass(triggers=False), Messages()
-    event = Definition('MSG: example_interfaces/srv/AddTwoInts_Event\nint64 a\n---\nint64 sum\n')
+    event = 'MSG: example_interfaces/srv/AddTwoInts_Event\nint64 a\n---\nint64 sum\n', ''
     with RunWriter(tmp_path / 'run') as run:
         run.add_topic('/add/_service_event', 'example_interfaces/srv/Add_Event', event)
         run.write('/add/_service_event', b'\0\1\0\0', START_NS, START_NS)

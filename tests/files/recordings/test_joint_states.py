@@ -41,7 +41,7 @@ def test_any_joints_agree_with_the_product_of_exponentials():
     joints = np.random.default_rng(8).uniform(-3.5, 3.5, (40, 6))  # beyond their limits, too
     joints[0] = 0.0
     robot = Robot.read(URDF)
-    assert (robot.base, robot.tip, robot.moving_joints) == ('base_link', 'tool0', list(JOINTS))
+    assert (robot.base, robot.tip, robot.arm.joints) == ('base_link', 'tool0', JOINTS)
     positions, quaternions = robot.poses(joints)
     assert np.allclose(positions[0], TIP_M, atol=1e-9)
     expected, turned = tip_poses(joints)

@@ -37,11 +37,11 @@ def topics(path):
 )
 def test_whole_recordings_of_others_come_back_whole(tmp_path, shared_data, name):
     source = shared_data / 'bags' / name
-    recovery = recover(source, tmp_path / 'recovered')
+    recovery, lost = recover(source, tmp_path / 'recovered')
     assert Counter(messages(tmp_path / 'recovered')) == Counter(messages(source))
     assert topics(tmp_path / 'recovered') == topics(source)
     assert recovery.message_count == len(messages(source))
-    assert (recovery.breaks, recovery.damaged_chunks) == ([], 0)
+    assert (lost['breaks'], lost['damaged_chunks']) == ([], 0)
 
 
 @pytest.fixture
@@ -64,10 +64,10 @@ def cut_run(tmp_path):
 @pytest.mark.parametrize('given', ['folder', 'file'])
 def test_a_cut_run_becomes_a_whole_one(tmp_path, cut_run, given):
     source = cut_run if given == 'folder' else cut_run / 'run_0.mcap'
-    recovery = recover(source, tmp_path / 'recovered')
+    recovery, lost = recover(source, tmp_path / 'recovered')
     assert 3_000 < recovery.message_count < 9_000
     assert recovery.counts == {'/gun': recovery.message_count}
-    assert recovery.breaks[0].endswith('the end is missing')
+    assert lost['breaks'][0].endswith('the end is missing')
     times = [time for _, _, time, _ in messages(tmp_path / 'recovered')]
     assert times == [(number + 1) * 1_000 for number in range(recovery.message_count)]
     content = yaml.safe_load((tmp_path / 'recovered/metadata.yaml').read_text())
@@ -78,7 +78,7 @@ def test_a_cut_run_becomes_a_whole_one(tmp_path, cut_run, given):
     latched, other = metadata['offered_qos_profiles']
     assert (latched['depth'], latched['durability']) == (1, 'transient_local')
     assert (other['depth'], other['reliability']) == (7, 'best_effort')
-    assert metadata['type_description_hash'] == standard(BOOL).type_hash
+    assert metadata['type_description_hash'] == standard(BOOL)[1]
 
 
 NESTED = '{a: ' * 600 + '1' + '}' * 600
@@ -92,13 +92,13 @@ def test_odd_metadata_in_a_file_do_not_keep_it_from_being_recovered(tmp_path, to
         run.add_topic('/gun', BOOL, standard(BOOL))
         run.write('/gun', b'\0\1\0\0\1', 1, 1)
         run._writer.add_metadata('rosbag2', {'serialized_metadata': told})
-    recovery = recover(run.path, tmp_path / 'recovered')
+    recovery, _ = recover(run.path, tmp_path / 'recovered')
     assert recovery.counts == {'/gun': 1}
 
 
 def gun_file(path, count, chunk_bytes, compression='zstd'):
     """A file of so many triggers, 1000 ns apart, and its chunks."""
-    on, text = np.random.default_rng(8).integers(2, size=count), standard(BOOL).text.encode()
+    on, text = np.random.default_rng(8).integers(2, size=count), standard(BOOL)[0].encode()
     with path.open('wb') as stream:
         kind = CompressionType[compression.upper()]
         writer = Writer(stream, chunk_size=chunk_bytes, compression=kind)
@@ -118,7 +118,7 @@ def test_the_beginning_of_a_cut_chunk_is_read(tmp_path, compression):
     path = tmp_path / 'run.mcap'
     (chunk,) = gun_file(path, 20_000, 10**7, compression)
     os.truncate(path, chunk.chunk_start_offset + int(0.6 * chunk.chunk_length))
-    recovery = recover(path, tmp_path / 'recovered')
+    recovery, _ = recover(path, tmp_path / 'recovered')
     read = [time for _, _, time, _ in messages(tmp_path / 'recovered')]
     assert 2_000 < recovery.message_count < 20_000
     assert read == list(range(0, 1000 * len(read), 1000))
@@ -137,7 +137,7 @@ def test_a_file_cut_at_any_byte_gives_back_all_its_whole_chunks(tmp_path):
         file = tmp_path / f'{cut}.mcap'
         file.write_bytes(content[:cut])
         try:
-            recovered = recover(file, tmp_path / f'recovered_{cut}').message_count
+            recovered = recover(file, tmp_path / f'recovered_{cut}')[0].message_count
         except RecordingError:
             recovered = 0
         assert recovered >= max((count for end, count in ends if end <= cut), default=0)
@@ -155,8 +155,8 @@ def test_a_flipped_bit_costs_one_chunk(tmp_path):
     path.write_bytes(content)
     with pytest.raises(RecordingError, match='is damaged'):
         read_recording(folder)
-    recovery = recover(folder, tmp_path / 'recovered')
-    assert recovery.damaged_chunks == 1
+    recovery, lost = recover(folder, tmp_path / 'recovered')
+    assert lost['damaged_chunks'] == 1
     assert 2_000 < recovery.message_count < 4_002
     read = read_recording(tmp_path / 'recovered', None, '/atomizer/state')
     assert set(read.stamps_ns.tolist()) < set(written.stamps_ns.tolist())

@@ -67,7 +67,7 @@ def test_metadata_and_records_of_a_run(run):
     assert channel.message_encoding == 'cdr'
     (profile,) = yaml.safe_load(channel.metadata['offered_qos_profiles'])
     assert set(profile) == QOS_KEYS
-    assert channel.metadata['topic_type_hash'] == standard(BOOL).type_hash
+    assert channel.metadata['topic_type_hash'] == standard(BOOL)[1]
     at_open, at_close = (
         yaml.safe_load(r.metadata['serialized_metadata'])
         for r in found if isinstance(r, Metadata) and r.name == 'rosbag2'
@@ -112,7 +112,7 @@ def test_a_killed_process_loses_less_than_a_second(tmp_path, repository):
     os.kill(process.pid, signal.SIGKILL)
     written_ns += map(int, process.stdout.read().split())
     process.wait()
-    recovery = recover(run, tmp_path / 'recovered')
+    recovery, _ = recover(run, tmp_path / 'recovered')
     lost_ns = written_ns[recovery.message_count :]
     # By the writer's own clock: a busy machine may keep it waiting between two messages.
     assert not lost_ns or lost_ns[-1] - lost_ns[0] < 1_000_000_000
@@ -157,7 +157,7 @@ def test_the_first_refused_write_is_the_last(tmp_path, repository):
     assert 'is incomplete after' in message
     assert f'paint recover {run}' in message
     assert not (run / 'metadata.yaml').exists()
-    recovery = recover(run, tmp_path / 'recovered')
+    recovery, _ = recover(run, tmp_path / 'recovered')
     # What the failing chunk held is lost: 64 KiB of messages of 36 bytes.
     assert 0 <= int(number) - recovery.message_count <= 64 * 1024 / 36 + 1
 
@@ -168,15 +168,15 @@ def test_text_is_what_rosbag2_wrote(shared_data):
     with (shared_data / 'bags/rosbag2_topics_and_services.mcap').open('rb') as stream:
         schemas = {r.name: r for r in StreamReader(stream).records if isinstance(r, Schema)}
     for name in ('rcl_interfaces/msg/ParameterEvent', 'rcl_interfaces/msg/Log'):
-        assert definitions.installed(name).text.encode() == schemas[name].data
+        assert definitions.installed(name)[0].encode() == schemas[name].data
 
 
 def test_installed_types_have_the_standard_hash_and_bring_all_they_use():
     pytest.importorskip('paint_msgs')
     for name in ('geometry_msgs/msg/PoseStamped', BOOL, 'sensor_msgs/msg/PointCloud2'):
-        assert definitions.standard(name).type_hash == definitions.installed(name).type_hash
-        assert definitions.standard(name).type_hash.startswith('RIHS01_')
-    text = definitions.installed('paint_msgs/msg/ComparisonStats').text
+        assert definitions.standard(name)[1] == definitions.installed(name)[1]
+        assert definitions.standard(name)[1].startswith('RIHS01_')
+    text = definitions.installed('paint_msgs/msg/ComparisonStats')[0]
     for used in ('std_msgs/Header', 'builtin_interfaces/Time', 'geometry_msgs/Point'):
         assert text.count(f'{definitions.SEPARATOR}\nMSG: {used}\n') == 1
     for name in ('no_msgs/msg/Nothing', 'std_msgs/msg/Nothing'):

@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.motion_files import MotionSource, read_gun_motions, read_recording
+from paint_deposition.files.motion_files import read_gun_motions, read_recording
+from paint_deposition.request import MotionOptions
 from robot_arm import URDF
 from workbook import write_workbook
 
@@ -128,7 +129,7 @@ def test_times_keep_their_nanoseconds_and_the_minus_of_print(file, heading, cell
 
 def test_a_second_gun_and_options_of_other_kinds_of_files_are_refused():
     with pytest.raises(RecordingError, match=r'plain\.csv is no bag and has the motion of one'):
-        read_gun_motions([LAYOUTS / 'plain.csv'], MotionSource(), ['a', 'b'])
+        read_gun_motions([LAYOUTS / 'plain.csv'], MotionOptions(), ['a', 'b'])
     with pytest.raises(RecordingError, match='--pose-topic is for bags'):
         read_recording(LAYOUTS / 'plain.csv', '/pose')
     with pytest.raises(RecordingError, match="rotation: 'zxq' is no convention; give 'rotvec'"):

@@ -265,7 +265,7 @@ def test_a_killed_recorder_keeps_what_came_before(ros_domain, publisher, wait_un
         def on_disk() -> int:
             # One chunk of poses that came within half a second, or several.
             with contextlib.suppress(RecordingError):
-                recovery = recover(tmp_path / 'run', tmp_path / f'tried_{next(attempts)}')
+                recovery, _ = recover(tmp_path / 'run', tmp_path / f'tried_{next(attempts)}')
                 return recovery.message_count
             return 0
 
@@ -273,7 +273,7 @@ def test_a_killed_recorder_keeps_what_came_before(ros_domain, publisher, wait_un
         wait_until(lambda: on_disk() == 100, what='all poses on disk')
         process.kill()
     assert not (tmp_path / 'run/metadata.yaml').exists()
-    recovery = recover(tmp_path / 'run', tmp_path / 'recovered')
+    recovery, _ = recover(tmp_path / 'run', tmp_path / 'recovered')
     assert recovery.counts == {'/pose': 100}
     assert len(read_recording(tmp_path / 'recovered')) == 100
     with Reader(tmp_path / 'recovered') as reader:

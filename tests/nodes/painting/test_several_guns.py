@@ -9,7 +9,8 @@ import pytest
 import paint_deposition as pd
 from nodes.cell import Robot, offline_um, turned, two_passes
 from paint_deposition.effects.library.sag import Sag
-from paint_deposition.files.motion_files import MotionSource, read_gun_motions
+from paint_deposition.files.motion_files import read_gun_motions
+from paint_deposition.request import MotionOptions
 
 
 def moved(motion: pd.Trajectory, by_m: list[float]) -> pd.Trajectory:
@@ -130,7 +131,7 @@ def test_the_film_is_the_sum_of_guns(simulator, record, guns, wait_until, painte
     wait_until(lambda: all(player.finished.done() for player in players), what='both replays')
     assert np.array_equal(painted(node, poses), live)
 
-    motions = [motion for _, motion in read_gun_motions([run], MotionSource(), GUNS)]
+    motions = [motion for _, motion in read_gun_motions([run], MotionOptions(), GUNS)]
     film = pd.simulate(node.surface, motions, [pd.DepositionModel(), THIN], names=GUNS)
     assert film.film_um.max() == pytest.approx(live.max(), rel=1e-6)
     assert np.abs(film.film_um - live).max() < 1e-5 * live.max()

@@ -6,7 +6,9 @@ their tables in the documentation follow from it.
 """
 
 import inspect
-from collections.abc import Callable, Mapping
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_args, get_origin
 
@@ -17,6 +19,7 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    field_validator,
     model_validator,
 )
 from pydantic.fields import FieldInfo
@@ -82,6 +85,27 @@ def given(
         default, description=text, gt=above, lt=below, ge=least, le=most,
         json_schema_extra={name: value for name, value in extra.items() if value},
     )  # fmt: skip
+
+
+# RAPID writes quaternions with four digits; further off is damage, not rounding.
+QUATERNION_TOLERANCE = 0.01
+POSE_FORMAT = 'seven numbers, x y z [m] and a unit quaternion qx qy qz qw'
+# Makers' conventions in the letters of scipy: capital letters turn about the axes of the tool as
+# it goes, small ones about those of the world.
+CONVENTIONS = {
+    'kuka': 'ZYX', 'abb': 'ZYX', 'fanuc': 'xyz', 'rpy': 'xyz', 'staubli': 'XYZ', 'kawasaki': 'ZYZ',
+}  # fmt: skip
+ROTATION_WORDS = (
+    "'rotvec' for a rotation vector, three letters for Euler angles (ZYX about the axes of the "
+    'tool, xyz about fixed axes), or kuka, abb, fanuc, rpy, staubli, kawasaki'
+)
+
+
+def is_pose(values: Sequence[float]) -> bool:
+    """Whether these are seven finite numbers whose last four are nearly a unit quaternion."""
+    if len(values) != 7 or not all(map(math.isfinite, values)):
+        return False
+    return abs(math.hypot(*values[3:]) - 1.0) <= QUATERNION_TOLERANCE
 
 
 class OnePart(BaseModel):
@@ -181,6 +205,23 @@ class MotionOptions(BaseModel, extra='forbid'):
         'qx qy qz qw.',
         metavar='X Y Z QX QY QZ QW',
     )  # fmt: skip
+
+    @field_validator('part_pose')
+    @classmethod
+    def _is_pose(cls, values: list[float] | None) -> list[float] | None:
+        if values is not None and not is_pose(values):
+            raise ValueError(f'{values} is no pose; give {POSE_FORMAT}')
+        return values
+
+    @field_validator('rotation')
+    @classmethod
+    def _is_rotation(cls, name: str | None) -> str | None:
+        if name is None or name.lower() in ('rotvec', *CONVENTIONS):
+            return name and name.lower()
+        # Two turns in a row about one axis are one, and no convention.
+        if not re.fullmatch(r'[xyz]{3}|[XYZ]{3}', name) or name[1] in (name[0], name[2]):
+            raise ValueError(f'{name!r} is no convention; give {ROTATION_WORDS}')
+        return name
 
 
 def takes(*kinds: type[BaseModel]) -> Callable[[Verb], Verb]:

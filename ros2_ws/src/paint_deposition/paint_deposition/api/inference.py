@@ -23,7 +23,7 @@ from paint_deposition.inference.diagnosis.refit import refit as refitted
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.calibration import calibrate as calibrated
-from paint_deposition.inference.fitting.cleaning import clean_and_fit
+from paint_deposition.inference.fitting.cleaning import STARTS, clean_and_fit
 from paint_deposition.inference.fitting.panel import short_reaches
 from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.posterior import of_brushes, with_brushes_of
@@ -72,19 +72,15 @@ def compare(
         model: taken as it is; default: the campaign's, else one fitted to the campaign.
     """
     model = model or _model_of(campaign)
-    bell = with_brushes_of(campaign, DepositionModel())
-    (model or bell).require_brushes(campaign.brushes)
-    doubts = require_paint(campaign, model or bell)
+    start = model or with_brushes_of(campaign, DepositionModel())
+    start.require_brushes(campaign.brushes)
+    doubts = require_paint(campaign, start)
     progress('fitting the pattern')
-    if model is not None:
-        study, _ = clean_and_fit(campaign, model, model.effects)
-        progress('comparing')
-        return replace(compared(study, model), warnings=(*study.warnings, *doubts))
-    study, fit = clean_and_fit(campaign, bell, starts=10)
+    study, fit = clean_and_fit(campaign, start, start.effects, STARTS if model else 10)
     progress('comparing')
-    reaches = short_reaches(study.campaign, fit.model)
+    reaches = short_reaches(study.campaign, fit.model) if model is None else ()
     warnings = (*study.warnings, *doubts, *map(str, reaches))
-    return replace(compared(study, fit.model), warnings=warnings)
+    return replace(compared(study, model or fit.model), warnings=warnings)
 
 
 def compare_models(

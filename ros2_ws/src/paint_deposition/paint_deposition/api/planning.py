@@ -17,7 +17,7 @@ from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.motion.programmed import timed
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, is_pose
+from paint_deposition.motion.transforms import Rigid
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
@@ -44,7 +44,7 @@ from paint_deposition.planning.requests import (
 )
 from paint_deposition.planning.retiming import retime_for_evenness
 from paint_deposition.planning.sides import WIDEST_RAD, painted_side
-from paint_deposition.request import takes
+from paint_deposition.request import POSE_FORMAT, is_pose, takes
 
 Progress = Callable[[str, float], None]
 

@@ -15,7 +15,6 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor, as_completed
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -36,16 +35,9 @@ if TYPE_CHECKING:
 Columns = Mapping[str, Any]
 # How long a scheduler may take to answer, and to have a worker.
 CONNECT_S = 30
-
-
-@dataclass(frozen=True)
-class Case:
-    """One piece of work."""
-
-    digest: str  # of all that it is computed from; the same digest is never computed twice
-    parameters: Any  # of this case alone, small
-    # Names of what it shares with other cases, such as a part or a motion.
-    inputs: tuple[str, ...] = ()
+# The digest of all that a case is computed from, of which none is computed twice; its own, small
+# parameters; and the names of what it shares with others, such as a part or a motion.
+Case = tuple[str, Any, Sequence[str]]
 
 
 def compute(
@@ -79,11 +71,20 @@ def compute(
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
+    from filelock import FileLock, Timeout
 
-    files = {case.digest: folder / f'{case.digest}.parquet' for case in cases}
+    folder.mkdir(parents=True, exist_ok=True)
+    try:  # the system frees it when a command dies
+        alone = FileLock(folder / '.lock', timeout=0).acquire()
+    except Timeout:
+        raise BatchError(
+            f'{folder} is in use by another command; wait for it, or choose another --output'
+        ) from None
+    files = {digest: folder / f'{digest}.parquet' for digest, *_ in cases}
     failures = {}
-    with _used_alone(folder):
-        left = {c.digest: c for c in cases if not files[c.digest].is_file()}
+    with alone:
+        once = {case[0]: case for case in cases}
+        left = [case for digest, case in once.items() if not files[digest].is_file()]
         done = len(cases) - len(left)
         for digest, future in finished(work, left, inputs, executor) if left else ():
             try:
@@ -99,7 +100,7 @@ def compute(
                 failures[digest] = pa.table({'error': [failure]})
             done += 1
             progress(f'{done} of {len(cases)} cases', done / len(cases))
-        rows = [failures.get(c.digest) or pq.read_table(files[c.digest]) for c in cases]
+        rows = [failures.get(c) or pq.read_table(files[c]) for c, *_ in cases]
     return pa.concat_tables(rows, promote_options='permissive'), len(left)
 
 
@@ -180,28 +181,13 @@ def code_digest() -> str:
     return digest.hexdigest()[:32]
 
 
-@contextmanager
-def _used_alone(folder: Path) -> Iterator[None]:
-    """Refuse a folder that another command uses; the system frees it when a command dies."""
-    from filelock import FileLock, Timeout
-
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        with FileLock(folder / '.lock', timeout=0):
-            yield
-    except Timeout:
-        raise BatchError(
-            f'{folder} is in use by another command; wait for it, or choose another --output'
-        ) from None
-
-
 def finished(
     work: Callable[..., Any],
-    cases: Mapping[str, Case],
+    cases: Sequence[Case],
     inputs: Mapping[str, Any],
     executor: AbstractContextManager[Any],
 ) -> Iterator[tuple[str, Future]]:
-    """Submit the cases by their digests, as ``compute`` does, and return each when it is done."""
+    """Submit the cases, as ``compute`` does, and return the digest of each when it is done."""
     futures: dict[Future, str] = {}
     with executor as pool:
         place: Callable[[bytes], Any] = bytes
@@ -209,17 +195,14 @@ def finished(
             # Dask sends the result of a task to each worker once, and computes it again where the
             # only worker that holds it dies.
             place, pool = partial(pool.submit, bytes, pure=False), pool.get_executor(pure=False)
-        names = {name for case in cases.values() for name in case.inputs}
+        names = {name for *_, shared in cases for name in shared}
         with warnings.catch_warnings():
             warnings.simplefilter('ignore')  # of Dask: inputs are large
             placed = {name: place(_serialised(inputs[name])) for name in names}
         try:
-            for case in cases.values():
-                given = (placed[name] for name in case.inputs)
-                future = pool.submit(
-                    _run_case, code_digest(), work, _serialised(case.parameters), *given
-                )
-                futures[future] = case.digest
+            for digest, parameters, shared in cases:
+                given = _serialised(parameters), *(placed[name] for name in shared)
+                futures[pool.submit(_run_case, code_digest(), work, *given)] = digest
             for future in as_completed(list(futures)):
                 yield futures.pop(future), future
         finally:
@@ -238,22 +221,21 @@ def _run_case(code: str, work: Callable[..., Any], parameters: bytes, *inputs: b
     return work(pickle.loads(parameters), *map(_deserialised, inputs))
 
 
-@lru_cache(maxsize=8)  # inputs that a worker keeps in memory
-def _deserialised(content: bytes) -> Any:
-    """An input; what it caches, such as a search tree, serves the next case too."""
-    return pickle.loads(content)
+# The inputs that a worker keeps: what one caches, such as a search tree, serves the next case too.
+_deserialised = lru_cache(maxsize=8)(pickle.loads)
 
 
 def _serialised(value: Any) -> bytes:
     """Bytes that ``pickle.loads`` opens elsewhere; the files of users' effects run there."""
     content = io.BytesIO()
     pickler = pickle.Pickler(content, protocol=5)
-    pickler.dispatch_table = copyreg.dispatch_table | {type(Effect): _class_reduced}
+    # How to make the class of a user's effect elsewhere; the name of any other.
+    pickler.dispatch_table = copyreg.dispatch_table | {
+        type(Effect): lambda model: (
+            (effect_of, (model.file, model.file_content))
+            if getattr(model, 'file', None)
+            else model.__qualname__
+        )
+    }
     pickler.dump(value)
     return content.getvalue()
-
-
-def _class_reduced(model: Any) -> Any:
-    """How to make the class of a user's effect elsewhere; the name of any other."""
-    file = getattr(model, 'file', None)
-    return (effect_of, (file, model.file_content)) if file else model.__qualname__

@@ -29,12 +29,13 @@ from paint_deposition.files.effect_file import load_unnamed_effect_file
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.files.motion_files import MotionSource, read_motion
+from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.provenance import model_digest, sha256
 from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.request import MotionOptions
 
 NOTHING = 'nothing'
 # Columns that hold a list in each row: the film at every vertex, the gauge at every reading.
@@ -80,7 +81,7 @@ class Job:
             model = job._model(values)
             own = [effect.file_content.decode() for effect in model.effects]
             digest = digest_of(code_digest(), model_digest(model), own, options, inputs)
-            job.cases.append(Case(digest, {'model': model, **options}, inputs))
+            job.cases.append((digest, {'model': model, **options}, inputs))
         return job
 
     @property
@@ -143,11 +144,11 @@ class Job:
         )  # fmt: skip
         recorded = NOTHING
         if motion is not None:
-            given = file.model_dump(include=set(MotionSource.model_fields))
+            given = file.model_dump(include=set(MotionOptions.model_fields))
             arm = given['urdf'] = given['urdf'] and str(self.folder / given['urdf'])
             if 'part_pose' in values:
                 given['part_pose'] = values['part_pose']
-            source, its = MotionSource.model_validate(given), [given, arm and sha256(Path(arm))]
+            source, its = MotionOptions.model_validate(given), [given, arm and sha256(Path(arm))]
             recorded = self._input('trajectory', motion, its, lambda: read_motion(motion, source))
         if not file.readings:
             return surface, recorded, NOTHING

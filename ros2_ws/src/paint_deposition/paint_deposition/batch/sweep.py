@@ -182,7 +182,8 @@ def _points(sweep: Sweep) -> pa.Table:
 
     rows = []
     for number, predicted in enumerate(sweep.table[PREDICTED].to_pylist(), start=1):
-        readings = sweep.job.inputs[sweep.job.cases[number - 1].inputs[2]]
+        *_, (*_, places) = sweep.job.cases[number - 1]
+        readings = sweep.job.inputs[places]
         for k, value in enumerate(predicted or ()):
             place = dict(zip(('x_m', 'y_m', 'z_m'), readings.positions_m[k].tolist(), strict=True))
             point = str(readings.point[k])

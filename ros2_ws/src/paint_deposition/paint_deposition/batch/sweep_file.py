@@ -16,20 +16,24 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import BatchError, did_you_mean
 from paint_deposition.files.atomic import read_yaml
-from paint_deposition.files.motion_files import MotionSource
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.transforms import POSE_FORMAT, is_pose
-from paint_deposition.request import Number, OnePart, Text, validate
+from paint_deposition.request import (
+    POSE_FORMAT,
+    MotionOptions,
+    Number,
+    OnePart,
+    Text,
+    is_pose,
+    validate,
+)
 
 INPUTS = ('mesh', 'trajectory', 'model')
 # Of passes that are planned, and of a recording as it was.
 PASS_KEYS = ('index_m', 'standoff_m', 'speed_m_per_s')
 MOTION_KEYS = ('speed_factor', 'standoff_change_m', 'flow_factor')
 SECTIONS: dict[str, type[BaseModel]] = {'planar': PlanarPattern, 'projection': Projection}
-# Of the pattern of one brush of several: 'brush_2.K1_cm3_per_s'.
-BRUSH = 'brush_'
 # Which draw from the posterior a case has.
 DRAW = 'draw'
 
@@ -105,7 +109,7 @@ class Passes(BaseModel, extra='forbid'):
     one_way: bool = Field(False, description='whether all passes run one way')
 
 
-class SweepFile(MotionSource, OnePart, extra='forbid'):
+class SweepFile(MotionOptions, OnePart, extra='forbid'):
     """A sweep as it is written; paths are relative to the file."""
 
     mesh: Text | None = Field(None, description='the name of a mesh file')
@@ -163,11 +167,9 @@ def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[
     names = [list(file.grid), sorted({n for case in file.cases for n in case}), drawn]
     seen: set[str] = set()
     effects = effects_of(models).values()
-    numbers = dict.fromkeys(brush.number for model in models for brush in model.brushes)
     known = [
         *INPUTS, 'part_pose', 'effects', *PASS_KEYS, *MOTION_KEYS,
         *(f'{section}.{n}' for section, cls in SECTIONS.items() for n in cls.model_fields),
-        *(f'{BRUSH}{k}.{n}' for k in numbers for n in PlanarPattern.model_fields),
         *(f'{effect.id}.{n}' for effect in effects for n in effect.parameters()),
     ]  # fmt: skip
     for name in (name for block in names for name in block):
@@ -255,21 +257,12 @@ def varied_model(
         if not dot:
             continue
         if owner == 'planar' and model.brushes:
-            numbers = [f'{BRUSH}{brush.number}' for brush in model.brushes]
             raise BatchError(
-                f'{name} varies, but the model has a pattern for each brush; vary '
-                f'{" or ".join(f"{number}.{field}" for number in numbers)}'
+                f'{name} varies, but the model has a pattern for each brush; give a model of one'
             )
         if owner in SECTIONS:
             section = _changed(getattr(model, owner), field, value, name)
             model = model.model_copy(update={owner: section})
-        elif owner.startswith(BRUSH):
-            number = int(owner.removeprefix(BRUSH))
-            model.with_brush(number)  # which says so where there is none of that number
-            model = model.with_patterns([
-                _changed(b.planar, field, value, name) if b.number == number else b.planar
-                for b in model.brushes
-            ])  # fmt: skip
         else:
             effect = model.effect(owner) or effects[owner]()
             model = model.with_effect(_changed(effect, field, value, name))

@@ -15,6 +15,7 @@ from paint_deposition.cli.results import print_all, progress
 from paint_deposition.errors import some
 from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
+from paint_deposition.request import MotionOptions, validate
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.bag_files import BagTopic
@@ -26,12 +27,9 @@ Contents = tuple[dict[str, Any], list[str]]
 
 
 @click.command('inspect')
-@click.argument('recording', type=options.FILE, required=False)
+@click.argument('recording', type=options.FILE)
 @options.POINTS
 @options.part_options(0.02, required=False)
-@click.option(
-    '--trajectory', type=options.FILE, help='The motion to set beside the part; or RECORDING.'
-)
 @click.option(
     '--out', '--output', '-o', 'output', type=options.FILE,
     help='Picture to draw, PNG: part, passes and tool axes from three sides.',
@@ -42,10 +40,9 @@ Contents = tuple[dict[str, Any], list[str]]
 @options.ALLOW_EFFECTS
 @options.JSON
 def inspect_command(
-    recording: Path | None,
+    recording: Path,
     points_file: Path | None,
     part: options.Part,
-    trajectory: Path | None,
     output: Path | None,
     model_file: Path | None,
     motion: dict[str, Any],
@@ -62,30 +59,27 @@ def inspect_command(
     With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
     part, and warnings of what is odd, each with its likely cause.
     """
-    path = trajectory or recording
-    if path is None or (trajectory and recording):
-        raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
     if part.mesh is None:
-        model, files = None, {'recording': str(path)}
-        figures, lines = _contents(path, points_file, part, motion, max_pose_gap_s)
+        model, files = None, {'recording': str(recording)}
+        figures, lines = _contents(recording, points_file, part, motion, max_pose_gap_s)
     elif points_file:
         raise click.UsageError('--points is for gauge readings; leave it or --mesh out')
     else:
         with progress('inspect') as show:
             show('reading')
-            recorded = pd.read_recording(path, **motion)
-            model = model_for(model_file, path)[0].model
-            seen = pd.look_at(part.surface(), recorded, model, max_pose_gap_s=max_pose_gap_s)
+            poses = pd.read_recording(recording, **motion)
+            model = model_for(model_file, recording)[0].model
+            seen = pd.look_at(part.surface(), poses, model, max_pose_gap_s=max_pose_gap_s)
             if output is not None:
                 from paint_deposition.report.plan_pictures import write_geometry_picture
 
                 show('drawing')
-                title = f'{path.name} over {part.mesh.name}'
+                title = f'{recording.name} over {part.mesh.name}'
                 write_geometry_picture(output, seen.surface, seen.path, seen.geometry, title)
         print_all('note', seen.notes)
         print_all('warning', [*seen.trajectory.warnings, *seen.geometry.warnings])
-        files = {'mesh': str(part.mesh), 'trajectory': str(path)}
-        told = {'mesh_file': str(part.mesh), 'trajectory': str(path), 'picture': output}
+        files = {'mesh': str(part.mesh), 'trajectory': str(recording)}
+        told = {'mesh_file': str(part.mesh), 'trajectory': str(recording), 'picture': output}
         figures, lines = seen.to_dict() | told, [seen.geometry.sentence]
         lines += [seen.geometry.facet_sentence, *([f'  {output}'] if output else [])]
     if as_json:  # the digests of long recordings take their time
@@ -95,7 +89,7 @@ def inspect_command(
 
 def _only(what: str, *names: str) -> None:
     """Refuse the options that were given and do nothing for what is shown; these do something."""
-    given = options.given_beside(*names, 'recording', 'trajectory', 'as_json', 'allow_effects')
+    given = options.given_beside(*names, 'recording', 'as_json', 'allow_effects')
     if given:
         raise click.UsageError(f'{" ".join(given)}: not for {what}; leave it out, or give --mesh')
 
@@ -107,16 +101,15 @@ def _contents(
     """What a module, table, mesh or bag holds."""
     from paint_deposition.errors import RecordingError
     from paint_deposition.files.meshes import SUFFIXES
-    from paint_deposition.files.motion_files import MOTION_KINDS, MotionSource, read_table
+    from paint_deposition.files.motion_files import MOTION_KINDS, read_table, require_kind
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_files import open_bag
     from paint_deposition.files.recordings.bags import BOOL_TYPE
     from paint_deposition.files.recordings.messages import STATE_TYPE
     from paint_deposition.files.recordings.pose_topics import sources_of_poses
     from paint_deposition.files.tables.poses import holds_readings, is_pose_table
-    from paint_deposition.request import validate
 
-    source = validate(MotionSource, 'motion', motion, RecordingError)
+    source = validate(MotionOptions, 'motion', motion, RecordingError)
     if path.suffix.lower() in SUFFIXES:
         _only('a mesh', 'mesh_scale', 'body')
         return _mesh_contents(path, part)
@@ -129,7 +122,7 @@ def _contents(
         print_all('warning', poses.warnings)
         return _table_contents(poses, max_pose_gap_s)
     kind = 'a RAPID module' if is_rapid(path) else 'a bag'
-    source.require_kind(path, kind)
+    require_kind(source, path, kind)
     if is_rapid(path):
         _only(kind, 'gun_signal', 'procedure')
         program = read_program(path, source.gun_signal, source.procedure)
@@ -140,7 +133,13 @@ def _contents(
     triggers = [t.name for kind in (STATE_TYPE, BOOL_TYPE) for t in topics if t.type == kind]
     figures = {
         'path': str(path), 'topics': [asdict(topic) for topic in topics],
-        'pose_streams': [source.to_dict() for source in sources], 'triggers': triggers,
+        'pose_streams': [
+            {name: value for name, value in vars(source).items() if name != 'quality'}
+            | (vars(source.quality) if source.quality else {})
+            | {'will_do': source.quality is not None}
+            for source in sources
+        ],
+        'triggers': triggers,
     }  # fmt: skip
     return figures, _bag_lines(path, topics, sources, triggers)
 
@@ -151,7 +150,7 @@ def _mesh_contents(path: Path, part: options.Part) -> Contents:
 
     from paint_deposition.files.meshes import LARGEST_M, WITH_UNIT, read_bodies
 
-    ((vertices, faces), *_), scale = read_bodies(path, part.body), part.mesh_scale
+    ((vertices, faces), _), scale = read_bodies(path, part.body), part.mesh_scale
     unit = '' if scale == 1.0 else f'read with --mesh-scale {scale:g}'
     if not unit and path.suffix.lower() not in WITH_UNIT:
         unit = 'it has no unit and is taken for metres'

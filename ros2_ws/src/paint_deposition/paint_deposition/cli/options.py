@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce, wraps
 from pathlib import Path
@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 
 import paint_deposition as pd
 from paint_deposition.errors import PaintError
-from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request
+from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request, is_pose
 
 Decorator = Callable[[Callable], Callable]
 
@@ -78,7 +78,7 @@ def options_of(
         settings: of click, by field, for what the model does not say.
     """
     fields = kind.model_fields
-    options = [option_of(kind, name, **settings.get(name, {})) for name in fields]
+    options = {name: option_of(kind, name, **settings.get(name, {})) for name in fields}
     # Of names with a unit only: others are also words of a sentence.
     called = {name: _names(name, field)[0] for name, field in fields.items() if '_' in name}
 
@@ -92,33 +92,30 @@ def options_of(
 
 
 def option_group(
-    options: Sequence[Decorator],
+    options: Mapping[str, Decorator],
     into: str,
     kind: Callable[..., Any] = dict,
     called: Mapping[str, str] = MappingProxyType({}),
 ) -> Decorator:
-    """Give a command these options; it takes what was given as one argument, of a kind.
+    """Give a command options by their names; it takes them as one argument, of a kind.
 
     In what the command then raises, words that are ``called`` otherwise as options are renamed.
     """
-
-    def with_options(function: Callable) -> Callable:
-        return reduce(lambda taken, option: option(taken), reversed(options), function)
 
     def with_group(command: Callable) -> Callable:
         @wraps(command)
         def with_one(**given: Any) -> Any:
             try:
-                return command(**{into: kind(**{n: given.pop(n) for n in names})}, **given)
+                return command(**{into: kind(**{n: given.pop(n) for n in options})}, **given)
             except PaintError as error:
                 # A whole word, and no part of a name of a file.
                 words = r'(?<![\w./-])\w+(?![\w/-]|\.\w)'
                 said = re.sub(words, lambda word: called.get(word[0], word[0]), str(error))
                 raise type(error)(said) from None
 
-        return with_options(with_one)
+        each = reversed([*options.values()])
+        return reduce(lambda taken, option: option(taken), each, with_one)
 
-    names = [option.name for option in click.command('any')(with_options(lambda: None)).params]
     return with_group
 
 
@@ -185,8 +182,6 @@ def _type(annotation: Any, metadata: list[Any], shown: Callable[[Any], Any]) -> 
 def _pose(ctx: click.Context, param: click.Parameter, given: tuple | None) -> list[float] | None:
     if given is None:
         return None
-    from paint_deposition.motion.transforms import is_pose
-
     if not is_pose(given):
         words = f'the quaternion qx qy qz qw has the norm {math.hypot(*given[3:]):.4g}, not 1'
         raise click.BadParameter(words, ctx, param)
@@ -227,7 +222,9 @@ JOINT_ACCELERATION = click.option(
 )  # fmt: skip
 ROBOT = ('urdf', 'tip_link', 'base_link')
 robot_options = option_group(
-    [*(option_of(MotionOptions, name) for name in ROBOT), JOINT_ACCELERATION], 'robot'
+    {name: option_of(MotionOptions, name) for name in ROBOT}
+    | {'joint_acceleration': JOINT_ACCELERATION},
+    'robot',
 )
 
 
@@ -274,25 +271,27 @@ class Part:
         """Its regions with targets of their own, if there are any."""
         if self.zones_file is None:
             return None
-        return pd.read_zones(self.zones_file, self.mesh or '', self.mesh_scale, self.body)
+        return pd.read_zones(self.zones_file, self.mesh or '', self.mesh_scale)
 
 
 def part_options(
     max_edge_length_m: float, required: bool = True, zones: bool = False
 ) -> Decorator:
     """A command takes the ``Part``."""
-    options: list[Decorator] = [
-        click.option('--mesh', required=required, type=FILE,
-                     help='The part: STL, PLY, OBJ, glTF or STEP.'),
-        *(option_of(OnePart, name) for name in ('mesh_scale', 'body', 'down')),
-        click.option(
+    options: dict[str, Decorator] = {
+        'mesh': click.option(
+            '--mesh', required=required, type=FILE, help='The part: STL, PLY, OBJ, glTF or STEP.'
+        ),
+        **{name: option_of(OnePart, name) for name in ('mesh_scale', 'body', 'down')},
+        'max_edge_length_m': click.option(
             '--max-edge-length-m', default=max_edge_length_m, show_default=True, type=POSITIVE,
             help='Longest edge of the refined mesh: larger triangles are split.',
         ),
-        click.option(
+    }  # fmt: skip
+    if zones:
+        options['zones_file'] = click.option(
             '--zones', 'zones_file', type=FILE,
             help='Regions of the part with a target and a tolerance of their own, YAML; '
             'elsewhere --target-um holds.',
-        ),
-    ]  # fmt: skip
-    return option_group(options if zones else options[:-1], 'part', Part)
+        )  # fmt: skip
+    return option_group(options, 'part', Part)

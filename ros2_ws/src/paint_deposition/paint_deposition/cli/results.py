@@ -129,13 +129,13 @@ def results_options(what: str, default: str | None = None) -> Decorator:
         'into it are removed; other files in it are kept as they are. Nothing is changed before '
         'all results are complete.'
     )
-    each = (
-        click.option('-o', '--output', type=FOLDER, required=default is None, default=default,
-                     help=text),
-        click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png',
-                     show_default=True, help='Format of the pictures.'),
-        JSON,
-    )  # fmt: skip
+    each = {
+        'output': click.option('-o', '--output', type=FOLDER, required=default is None,
+                               default=default, help=text),
+        'pictures': click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']),
+                                 default='png', show_default=True, help='Format of the pictures.'),
+        'as_json': JSON,
+    }  # fmt: skip
     return option_group(each, 'results', Results)
 
 
@@ -192,7 +192,7 @@ def results_in(folder: Path) -> Iterator[Path]:
 
 
 def _replace(folder: Path, work: Path, former: Path) -> None:
-    """Put the former results aside, by one rename where nothing else is there; the new in."""
+    """Put the former results aside and the new in, each file by a rename."""
     old, new = _written(folder), _files_below(work)
     present = {path.name for path in folder.iterdir()} if folder.exists() else set()
     ours = _tops(old | new)
@@ -204,13 +204,8 @@ def _replace(folder: Path, work: Path, former: Path) -> None:
                 f'{folder / strange} was not written by paint; move it away, or choose '
                 'another --output'
             )
-    if not folder.exists() or (
-        MARKER in present <= ours | {MARKER} and not Path.cwd().is_relative_to(folder)
-    ):
+    if not folder.exists():
         _mark(work, work, new)
-        with suppress(FileNotFoundError):
-            shutil.copymode(folder, work)
-            folder.rename(former)
         work.rename(folder)
         return
     _mark(work, folder, old | new)
@@ -226,8 +221,6 @@ def _replace(folder: Path, work: Path, former: Path) -> None:
 
 def _put_right(folder: Path, work: Path, former: Path) -> None:
     """Bring back former results unless the new ones count, and remove the rest."""
-    if _is_tree(former) and not folder.exists():
-        former.rename(folder)
     if _is_tree(work) and (former / MARKER).is_file():
         old = _tops(_written(former))
         for name in _tops(_written(folder)):

@@ -18,10 +18,10 @@ from paint_deposition.cli.models import models_for
 from paint_deposition.cli.results import SHOW_PROGRESS_AFTER_S, Show, print_all, progress, python
 from paint_deposition.errors import PaintError
 from paint_deposition.report.live_page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
+from paint_deposition.request import FilmBand, MotionOptions, validate
 
 if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
-    from paint_deposition.request import FilmBand
 
 # Options of `watch` that say how a cell is shown live; all others are of a recorded run.
 OF_LIVE = (
@@ -109,10 +109,9 @@ def _replay(
 ) -> Replay:  # fmt: skip
     show('loading')
     from paint_deposition.api.replaying import Replay
-    from paint_deposition.files.motion_files import MotionSource, read_gun_motions
+    from paint_deposition.files.motion_files import read_gun_motions
     from paint_deposition.files.recordings.bag_files import custom_data, open_bag
     from paint_deposition.files.recordings.bags import STATE_TOPIC
-    from paint_deposition.request import validate
 
     show('reading')
     if not run.exists():
@@ -125,7 +124,7 @@ def _replay(
     if not mesh:
         raise click.UsageError(f'{run} does not name the mesh of its part; give --mesh')
     named = Path(recorded['model_file']) if recorded.get('model_file') else None
-    guns = read_gun_motions([run], validate(MotionSource, 'motion', motion, pd.PaintError))
+    guns = read_gun_motions([run], validate(MotionOptions, 'motion', motion, pd.PaintError))
     files = [file for file in (model_file or named,) if file]
     chosen = models_for(files, [run], [name for name, _ in guns], named=model_file is not None)
     show('refining the mesh')
@@ -177,17 +176,16 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
         total=size, unit='B', unit_scale=True, desc='recover', delay=SHOW_PROGRESS_AFTER_S,
         disable=None,
     ) as bar:  # fmt: skip
-        found = recover(run, output, on_bytes=bar.update)
+        found, lost = recover(run, output, on_bytes=bar.update)
     figures = {
         'folder': str(found.folder), 'messages': found.message_count, 'topics': found.counts,
-        'damaged_chunks': found.damaged_chunks, 'breaks': found.breaks,
-        'skipped_topics': found.skipped_topics, 'provenance': origin(files={'recording': run}),
+        **lost, 'provenance': origin(files={'recording': run}),
     }  # fmt: skip
-    lines = [*found.breaks]
-    if found.damaged_chunks:
-        lines.append(f'{found.damaged_chunks} damaged chunks left out')
-    if found.skipped_topics:
-        lines.append(f'left out, not CDR or without a schema: {" ".join(found.skipped_topics)}')
+    lines = [*lost['breaks']]
+    if count := lost['damaged_chunks']:
+        lines.append(f'{count} damaged chunks left out')
+    if topics := lost['skipped_topics']:
+        lines.append(f'left out, not CDR or without a schema: {" ".join(topics)}')
     lines += [f'{count:10d}  {topic}' for topic, count in found.counts.items()]
     lines.append(f'{found.message_count} messages recovered: {found.folder}')
     click.echo(json_text(figures) if as_json else '\n'.join(lines))

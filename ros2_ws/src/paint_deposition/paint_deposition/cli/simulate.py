@@ -22,7 +22,7 @@ from paint_deposition.cli.results import (
 )
 from paint_deposition.errors import RecordingError
 from paint_deposition.planning.requests import MeasureRequest, PlanRequest
-from paint_deposition.request import FilmBand, MotionOptions
+from paint_deposition.request import FilmBand, MotionOptions, validate
 
 if TYPE_CHECKING:
     from paint_deposition.film.statistics import FilmStatistics
@@ -89,11 +89,10 @@ def simulate_command(
         raise click.UsageError('--wet-on-wet has no --coat; name the coats, one for each motion')
     with progress('simulate') as show:
         show('loading')
-        from paint_deposition.files.motion_files import MotionSource, read_gun_motions
-        from paint_deposition.request import validate
+        from paint_deposition.files.motion_files import read_gun_motions
 
         show('reading')
-        source = validate(MotionSource, 'motion', motion, pd.PaintError)
+        source = validate(MotionOptions, 'motion', motion, pd.PaintError)
         names, motions = zip(*read_gun_motions(trajectories, source, atomizers), strict=True)
         chosen = models_for(model_files, trajectories, names)
         show('refining the mesh')

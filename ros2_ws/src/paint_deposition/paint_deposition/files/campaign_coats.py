@@ -9,16 +9,15 @@ import numpy as np
 from pydantic import Field
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.motion_files import MotionSource
 from paint_deposition.film.common_film import TOTAL, Coats, WetFilms
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.eq1_pattern import MOST, listed
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import ONLY_BRUSH
-from paint_deposition.request import Name, Number, Text, validate
+from paint_deposition.request import MotionOptions, Name, Number, Text, validate
 
 
-class _Gun(MotionSource):
+class _Gun(MotionOptions):
     """One of several guns; what it does not say holds for it as for the coat or experiment."""
 
     trajectory: Text | None = Field(None, description='the name of a recording, module or table')
@@ -49,7 +48,7 @@ class CoatEntry(PaintJob):
 
 # A gun as a campaign names it: the file of its motion, what to read of that, and its brush, where
 # the file names none.
-GunMotion = tuple[str, MotionSource, int | None]
+GunMotion = tuple[str, MotionOptions, int | None]
 
 
 def with_brush(path: SprayPath, brush: int | None) -> SprayPath:
@@ -161,8 +160,8 @@ def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotion:
         raise ReadingsError(
             f"{whose} has no 'trajectory'; give the name of a recording, RAPID module or table"
         )
-    source = MotionSource(
-        **{key: v for key, v in said.items() if key in MotionSource.model_fields}
+    source = MotionOptions(
+        **{key: v for key, v in said.items() if key in MotionOptions.model_fields}
     )
     if source.urdf:
         source = source.model_copy(update={'urdf': str(folder / source.urdf)})

@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import StringIO
 from itertools import pairwise
 from pathlib import Path
@@ -46,8 +46,8 @@ def read_readings(
         ReadingsError: what is wrong, with all lines at fault, and what to do.
     """
     path, layout = Path(path), layout or Layout()
-    listed = None if points is None else MeasuringPoints.read(Path(points), layout, surface)
-    read = ReadingTable.read(path, True, layout, listed.labels if listed else ())
+    listed = None if points is None else read_list(Path(points), layout, surface)
+    read = ReadingTable.read(path, True, layout, (listed and listed.labels) or ())
     thickness, row, layers, film_words = read.films_um()
     for k in np.flatnonzero((thickness < THINNEST_UM) | (thickness > THICKEST_UM)):
         found = f'{read.heading("thickness")} is {thickness[k]:g}'
@@ -56,8 +56,8 @@ def read_readings(
         read.add_error(row[k], f'{found}; expected {span}{unit}')
     doubts = tuple(read.doubts())
     if listed is not None:
-        positions, normals, labels, place_words = listed.joined_to(read)
-        measured, count = len({*labels.tolist()}), len(listed.labels)
+        positions, normals, labels, place_words = _joined(listed, read)
+        measured, count = len({*labels.tolist()}), len(listed)
         if 2 * measured < count:
             doubts += (
                 f'only {measured} of the {count} points in {listed.path.name} have a reading; see '
@@ -89,134 +89,129 @@ def read_points(path: str | Path, unit: str | None = None) -> dict[str, np.ndarr
 
     ``unit`` is 'm', 'mm' or 'cm' where the headings have none.
     """
-    points = MeasuringPoints.read(Path(path), Layout(), None, LENGTHS[unit] if unit else None)
-    return dict(zip(points.labels, points.positions_m, strict=True))
+    points = read_list(Path(path), Layout(), None, LENGTHS[unit] if unit else None)
+    return dict(zip(points.labels or (), points.positions_m, strict=True))
 
 
-@dataclass(frozen=True)
-class MeasuringPoints:
-    """A list of points on a part: labels, (P, 3) in the mesh frame [m], outward unit normals."""
+def read_list(
+    path: Path, layout: Layout, surface: Surface | None, default_m: float | None = None
+) -> ReadingTable:
+    """Read a list of measuring points: their labels and x, y, z, or from_left, height.
 
-    path: Path
-    labels: list[str]
-    positions_m: np.ndarray
-    normals: np.ndarray | None
-    words: str
-
-    @staticmethod
-    def read(
-        path: Path, layout: Layout, surface: Surface | None, default_m: float | None = None
-    ) -> 'MeasuringPoints':
-        """Read a list: point label and x, y, z, or from_left, height.
-
-        ``default_m`` is the unit of places whose headings have none [m].
-        """
-        try:
-            read = ReadingTable.read(path, False, Layout(unit=layout.unit))
-        except ReadingsError:
-            # What is said of the readings may settle what the list leaves open.
-            own = replace(layout, columns={}, zero='')
-            if not (layout.decimal or layout.sheet):
-                raise
-            read = ReadingTable.read(path, False, own)
-        columns = [k for axis in (*AXES, *ON_FACE) for k in read.at.get(axis, [])]
-        if default_m and not any(read.headings[k].unit for k in columns):
-            read.layout = replace(read.layout, unit={'position': default_m})
-        positions, normals, place_words = _places(read, surface)
-        labels = read.labels
-        if labels is None:
-            raise read.error(
-                'the points have no labels; give a column point, with the labels of the readings'
-            )
-        first: dict[str, int] = {}
-        for row, label in enumerate(labels):
-            other = first.setdefault(label, row)
-            if not label:
-                read.add_error(row, NO_LABEL)
-            elif not np.array_equal(positions[row], positions[other]):
-                same = f"point '{label}' is elsewhere in line {read.lines[other]}"
-                read.add_error(row, f'{same}; keep one')
-        read.refuse_errors()
-        words = f'{place_words} of {len(labels)} points in {path.name} ({read.form})'
-        return MeasuringPoints(path, labels, positions, normals, words)
-
-    def joined_to(
-        self, readings: ReadingTable
-    ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray, str]:
-        """Positions (N, 3) [m], normals, labels (N,) of the rows of readings, and what was done.
-
-        Rows that name no listed point are errors of the table of readings.
-        """
-        wanted, by = self._wanted_by(readings)
-        places = {label: row for row, label in enumerate(self.labels)}
-        known = f"its points are called '{self.labels[0]}' to '{self.labels[-1]}'"
-        if any(wanted) and places.keys().isdisjoint(wanted):
-            raise readings.error(
-                f"the readings are called '{wanted[0]}' to '{wanted[-1]}', and there is no such "
-                f'point in {self.path.name} ({known}); name them alike, or leave the labels of '
-                'the readings out where they are in the order of the points'
-            )
-        for row, label in enumerate(wanted):
-            if label not in places:
-                missing = f"no point '{label}' in {self.path.name} ({known})"
-                readings.add_error(row, missing if label else NO_LABEL)
-        rows = [places.get(label, 0) for label in wanted]
-        words = f'{self.words}, joined {by}'
-        if unmeasured := [label for label in self.labels if label not in set(wanted)]:
-            named = some(unmeasured, 6)
-            words += f' ({len(unmeasured)} of them without a reading: {named})'
-        normals = None if self.normals is None else self.normals[rows]
-        return self.positions_m[rows], normals, np.array(wanted), words
-
-    def _wanted_by(self, readings: ReadingTable) -> tuple[list[str], str]:
-        """Labels (N,) of the points that the rows belong to, and by what they are known.
-
-        A gauge's own count of its readings is their order: it knows nothing of a point left out.
-        """
-        labels, by = readings.labels, readings.named_by
-        orders = [([*map(str, order)], count) for order, count in readings.orders]
-        if labels and {*labels}.isdisjoint(self.labels) and len({*labels}) == 1:
-            # The name of the part, or none.
-            labels = labels if labels[0] and not format_of(readings.headings) else None
-        again = ''
-        if labels is not None and by[-1] == 'number':
-            if {*labels}.isdisjoint(self.labels):
-                labels, by = readings.of('number'), ('number',)
-            if by == ('number',):
-                again = _counts_anew(readings)
-                in_order = labels == orders[0][0] or (again and {*self.labels} - {*labels})
-                labels = None if in_order else labels
-        if labels is not None:
-            return labels, f"by '{' '.join(map(readings.heading, by))}'"
-        for order, count in orders:
-            if count == len(self.labels):
-                if not {*order} <= {*self.labels}:
-                    order = [self.labels[int(number) - 1] for number in order]
-                self._refuse_unknown_labels(readings, order)
-                unnamed = '' if readings.named_by else ' (no column is known as their label)'
-                return order, f'by the order of the readings{unnamed}'
-        if again:
-            raise readings.error(f"{again}; give a column 'point' with the labels of the points")
-        figures = readings.figures_at_end
-        unknown = 'which is missing is not known; write n/a in its place'
-        raise readings.error(
-            f'{orders[0][1]} readings in order for the {len(self.labels)} points in '
-            f'{self.path.name}: {f"{figures}; delete it if so" if figures else unknown}, or give '
-            "a column 'point' with the labels of the points"
+    ``default_m`` is the unit of places whose headings have none [m].
+    """
+    try:
+        read = ReadingTable.read(path, False, Layout(unit=layout.unit))
+    except ReadingsError:
+        # What is said of the readings may settle what the list leaves open.
+        own = replace(layout, columns={}, zero='')
+        if not (layout.decimal or layout.sheet):
+            raise
+        read = ReadingTable.read(path, False, own)
+    columns = [k for axis in (*AXES, *ON_FACE) for k in read.at.get(axis, [])]
+    if default_m and not any(read.headings[k].unit for k in columns):
+        read.layout = replace(read.layout, unit={'position': default_m})
+    positions, read.normals, place_words = _places(read, surface)
+    labels = read.labels
+    if labels is None:
+        raise read.error(
+            'the points have no labels; give a column point, with the labels of the readings'
         )
+    first: dict[str, int] = {}
+    for row, label in enumerate(labels):
+        other = first.setdefault(label, row)
+        if not label:
+            read.add_error(row, NO_LABEL)
+        elif not np.array_equal(positions[row], positions[other]):
+            same = f"point '{label}' is elsewhere in line {read.lines[other]}"
+            read.add_error(row, f'{same}; keep one')
+    read.refuse_errors()
+    read.positions_m = positions
+    read.place_words = f'{place_words} of {len(labels)} points in {path.name} ({read.form})'
+    return read
 
-    def _refuse_unknown_labels(self, readings: ReadingTable, order: list[str]) -> None:
-        """Refuse readings in order where a column that is not known holds the points' labels."""
-        known = {column for columns in readings.at.values() for column in columns}
-        for k in {*range(len(readings.headings))} - known:
-            texts = readings.texts(k)
-            counts = len({*texts}) < len(texts) and all(map(str.isdigit, texts))
-            if {*texts} <= {*self.labels} and texts != order and not counts:
-                heading = readings.headings[k].text
-                raise readings.error(
-                    f"the column '{heading}' holds the labels of {self.path.name} but is not "
-                    f'known as the label; say columns: {{point: {heading}}}'
-                )
+
+def _joined(
+    listed: ReadingTable, readings: ReadingTable
+) -> tuple[np.ndarray, np.ndarray | None, np.ndarray, str]:
+    """Positions (N, 3) [m], normals, labels (N,) of the rows of readings, and what was done.
+
+    Rows that name no listed point are errors of the table of readings.
+    """
+    wanted, by = _wanted_by(listed, readings)
+    labels = listed.labels or []
+    places = {label: row for row, label in enumerate(labels)}
+    known = f"its points are called '{labels[0]}' to '{labels[-1]}'"
+    if any(wanted) and places.keys().isdisjoint(wanted):
+        raise readings.error(
+            f"the readings are called '{wanted[0]}' to '{wanted[-1]}', and there is no such "
+            f'point in {listed.path.name} ({known}); name them alike, or leave the labels of '
+            'the readings out where they are in the order of the points'
+        )
+    for row, label in enumerate(wanted):
+        if label not in places:
+            missing = f"no point '{label}' in {listed.path.name} ({known})"
+            readings.add_error(row, missing if label else NO_LABEL)
+    rows = [places.get(label, 0) for label in wanted]
+    words = f'{listed.place_words}, joined {by}'
+    if unmeasured := [label for label in labels if label not in set(wanted)]:
+        named = some(unmeasured, 6)
+        words += f' ({len(unmeasured)} of them without a reading: {named})'
+    normals = None if listed.normals is None else listed.normals[rows]
+    return listed.positions_m[rows], normals, np.array(wanted), words
+
+
+def _wanted_by(listed: ReadingTable, readings: ReadingTable) -> tuple[list[str], str]:
+    """Labels (N,) of the points that the rows belong to, and by what they are known.
+
+    A gauge's own count of its readings is their order: it knows nothing of a point left out.
+    """
+    names, labels, by = listed.labels or [], readings.labels, readings.named_by
+    orders = [([*map(str, order)], count) for order, count in readings.orders]
+    if labels and {*labels}.isdisjoint(names) and len({*labels}) == 1:
+        # The name of the part, or none.
+        labels = labels if labels[0] and not format_of(readings.headings) else None
+    again = ''
+    if labels is not None and by[-1] == 'number':
+        if {*labels}.isdisjoint(names):
+            labels, by = readings.of('number'), ('number',)
+        if by == ('number',):
+            again = _counts_anew(readings)
+            in_order = labels == orders[0][0] or (again and {*names} - {*labels})
+            labels = None if in_order else labels
+    if labels is not None:
+        return labels, f"by '{' '.join(map(readings.heading, by))}'"
+    for order, count in orders:
+        if count == len(names):
+            if not {*order} <= {*names}:
+                order = [names[int(number) - 1] for number in order]
+            _refuse_unknown_labels(listed, readings, order)
+            unnamed = '' if readings.named_by else ' (no column is known as their label)'
+            return order, f'by the order of the readings{unnamed}'
+    if again:
+        raise readings.error(f"{again}; give a column 'point' with the labels of the points")
+    figures = readings.figures_at_end
+    unknown = 'which is missing is not known; write n/a in its place'
+    raise readings.error(
+        f'{orders[0][1]} readings in order for the {len(names)} points in '
+        f'{listed.path.name}: {f"{figures}; delete it if so" if figures else unknown}, or give '
+        "a column 'point' with the labels of the points"
+    )
+
+
+def _refuse_unknown_labels(listed: ReadingTable, readings: ReadingTable, order: list[str]) -> None:
+    """Refuse readings in order where a column that is not known holds the points' labels."""
+    names = {*(listed.labels or ())}
+    known = {column for columns in readings.at.values() for column in columns}
+    for k in {*range(len(readings.headings))} - known:
+        texts = readings.texts(k)
+        counts = len({*texts}) < len(texts) and all(map(str.isdigit, texts))
+        if {*texts} <= names and texts != order and not counts:
+            heading = readings.headings[k].text
+            raise readings.error(
+                f"the column '{heading}' holds the labels of {listed.path.name} but is not "
+                f'known as the label; say columns: {{point: {heading}}}'
+            )
 
 
 def _counts_anew(readings: ReadingTable) -> str:

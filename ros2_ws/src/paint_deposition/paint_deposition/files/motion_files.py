@@ -1,6 +1,5 @@
 """Reading the motion of guns from files of any kind, in the frame of the part."""
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import field_validator
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
@@ -17,10 +15,9 @@ from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.recordings.messages import JOINT_TYPE
 from paint_deposition.files.recordings.pose_topics import lookups, read_frames
-from paint_deposition.files.tables.pose_columns import CONVENTIONS, ROTATION_WORDS
 from paint_deposition.files.tables.poses import is_pose_table, read_pose_table
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
+from paint_deposition.motion.transforms import Rigid, at_part, is_frame
 from paint_deposition.request import MotionOptions, validate
 
 if TYPE_CHECKING:
@@ -45,33 +42,13 @@ MOTION_KINDS = {
 }  # fmt: skip
 
 
-class MotionSource(MotionOptions):
-    """What to read of a motion file, and the pose of the part; None: not given."""
-
-    @field_validator('part_pose')
-    @classmethod
-    def _is_pose(cls, values: list[float] | None) -> list[float] | None:
-        if values is not None and not is_pose(values):
-            raise ValueError(f'{values} is no pose; give {POSE_FORMAT}')
-        return values
-
-    @field_validator('rotation')
-    @classmethod
-    def _is_rotation(cls, name: str | None) -> str | None:
-        if name is None or name.lower() in ('rotvec', *CONVENTIONS):
-            return name and name.lower()
-        # Two turns in a row about one axis are one, and no convention.
-        if not re.fullmatch(r'[xyz]{3}|[XYZ]{3}', name) or name[1] in (name[0], name[2]):
-            raise ValueError(f'{name!r} is no convention; give {ROTATION_WORDS}')
-        return name
-
-    def require_kind(self, path: Path, kind: str) -> None:
-        """Refuse fields that do not apply to a kind of file, such as 'a bag'."""
-        plural = {'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules'}
-        for name, kinds in MOTION_KINDS.items():
-            if plural[kind] not in kinds and getattr(self, name) is not None:
-                option = f'--{name.replace("_", "-")}'
-                raise RecordingError(f'{option} is for {kinds}, {path} is {kind}; leave it out')
+def require_kind(source: MotionOptions, path: Path, kind: str) -> None:
+    """Refuse options that do not apply to a kind of file, such as 'a bag'."""
+    plural = {'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules'}
+    for name, kinds in MOTION_KINDS.items():
+        if plural[kind] not in kinds and getattr(source, name) is not None:
+            option = f'--{name.replace("_", "-")}'
+            raise RecordingError(f'{option} is for {kinds}, {path} is {kind}; leave it out')
 
 
 def read_recording(
@@ -87,23 +64,23 @@ def read_recording(
         path: a bag, a RAPID module or a table of poses.
         pose_topic, state_topic: of a bag.
         gun_signal: digital output that opens the gun; for RAPID modules only.
-        more: the other fields of ``MotionSource``, such as ``part_pose``.
+        more: the other fields of ``MotionOptions``, such as ``part_pose``.
 
     Raises:
         RecordingError: the file, an option, or the frame of the poses is wrong.
     """
     given = {'pose_topic': pose_topic, 'state_topic': state_topic, 'gun_signal': gun_signal}
-    return read_motion(path, validate(MotionSource, 'motion', given | more, RecordingError))
+    return read_motion(path, validate(MotionOptions, 'motion', given | more, RecordingError))
 
 
-def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajectory:
+def read_motion(path: str | Path, source: MotionOptions, gun: str = '') -> Trajectory:
     """``read_recording`` with the options of a campaign or the command line.
 
     ``gun`` is the name that precedes the gun's topics in the bag, '' for none.
     """
     path = Path(path)
     if is_rapid(path):
-        source.require_kind(path, 'a RAPID module')
+        require_kind(source, path, 'a RAPID module')
         program = read_program(path, source.gun_signal, source.procedure)
         try:
             recorded = program_trajectory(program)
@@ -118,7 +95,7 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
             f'speed_m_per_s), and say --rotation {maker[1]}'
         )
     else:
-        source.require_kind(path, 'a bag')
+        require_kind(source, path, 'a bag')
         with open_bag(path) as bag:
             recorded = replace(_read_bag(bag, source, gun), source=str(path))
             brought = _in_part_frame(recorded, source, bag)
@@ -130,7 +107,7 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     return _turned(_in_part_frame(replace(recorded, source=str(path)), source, None), source)
 
 
-def _turned(recorded: Trajectory, source: MotionSource) -> Trajectory:
+def _turned(recorded: Trajectory, source: MotionOptions) -> Trajectory:
     """The motion with the axis along which the tool sprays as its z."""
     if not source.tool_axis:
         return recorded
@@ -153,14 +130,14 @@ def holds_joints(path: Path) -> bool:
         return bool(bag.topics_of(JOINT_TYPE))
 
 
-def read_table(path: Path, source: MotionSource) -> Trajectory:
+def read_table(path: Path, source: MotionOptions) -> Trajectory:
     """The motion in a table, in the frame of its poses."""
-    source.require_kind(path, 'a table of poses')
+    require_kind(source, path, 'a table of poses')
     return read_pose_table(path, source, _robot(path, source))
 
 
 def read_gun_motions(
-    files: Sequence[Path], source: MotionSource, atomizers: Sequence[str] = ()
+    files: Sequence[Path], source: MotionOptions, atomizers: Sequence[str] = ()
 ) -> list[tuple[str, Trajectory]]:
     """The name of each gun, '' for the only one, and its motion, from a file for each.
 
@@ -194,25 +171,23 @@ def read_gun_motions(
     return [(name, read_motion(file, source, gun)) for name, file, gun in of_each]
 
 
-def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
+def _read_bag(bag: Bag, source: MotionOptions, gun: str) -> Trajectory:
     """The motion in a bag, in the frame of its poses."""
     robot = _robot(bag.path, source)
     if robot and source.tf:
         raise RecordingError(f'{bag.path}: both tf and urdf are given; leave one of them out')
-    how = source.tf, robot, source.pose_unit
+    poses, trigger, notes = source.pose_topic, source.state_topic, tuple[str, ...]()
     if gun:
         state = bag.find(f'/{gun}{STATE_TOPIC}')
-        trigger = state.name if state else None
-        return trajectory_of(bag, f'/{gun}{POSE_TOPIC}', trigger, *how)
-    # The bag of a plan names its trigger itself.
-    planned = None if source.state_topic else bag.custom_data.get(TRIGGER)
-    trigger = source.state_topic or planned
-    recorded = trajectory_of(bag, source.pose_topic, trigger, *how)
-    notes = (f'a plan: its trigger {planned} is used',) if planned else ()
+        poses, trigger = f'/{gun}{POSE_TOPIC}', state.name if state else None
+    elif not trigger and (trigger := bag.custom_data.get(TRIGGER)):
+        # The bag of a plan names its trigger itself.
+        notes = (f'a plan: its trigger {trigger} is used',)
+    recorded = trajectory_of(bag, poses, trigger, source.tf, robot, source.pose_unit)
     return replace(recorded, notes=(*recorded.notes, *notes))
 
 
-def _robot(path: Path, source: MotionSource) -> 'Robot | None':
+def _robot(path: Path, source: MotionOptions) -> 'Robot | None':
     """The robot whose joints the recording has, None where it has poses."""
     if not source.urdf:
         if source.tip_link or source.base_link or source.joint_prefix:
@@ -229,7 +204,7 @@ def _robot(path: Path, source: MotionSource) -> 'Robot | None':
     )  # fmt: skip
 
 
-def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) -> Trajectory:
+def _in_part_frame(recorded: Trajectory, source: MotionOptions, bag: Bag | None) -> Trajectory:
     """Transform by the given pose of the part, else by the transforms of the recording."""
     named, part = recorded.frame_id, source.frame_id or PART
     recorded = replace(recorded, read_in=named)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from paint_deposition.motion.stream_quality import RepeatedSamples
 from paint_deposition.motion.trajectory import ONLY_BRUSH, PoseCounts, Trajectory
-from paint_deposition.motion.transforms import QUATERNION_TOLERANCE
+from paint_deposition.request import QUATERNION_TOLERANCE
 
 # Two hours at 250 Hz, 64 bytes a pose.
 DEFAULT_POSE_MEMORY = 2_000_000

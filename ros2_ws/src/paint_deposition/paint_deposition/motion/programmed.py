@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory
-from paint_deposition.motion.transforms import POSE_FORMAT, is_pose
+from paint_deposition.request import POSE_FORMAT, is_pose
 
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
 

@@ -3,7 +3,6 @@
 Frames follow the rules of tf2, live and from a recording.
 """
 
-import math
 from bisect import bisect_left, bisect_right
 from collections import ChainMap
 from collections.abc import Sequence
@@ -17,18 +16,8 @@ import numpy as np
 from paint_deposition.motion.path import write_rotation
 from paint_deposition.motion.trajectory import Trajectory
 
-# RAPID writes quaternions with four digits; further off is damage, not rounding.
-QUATERNION_TOLERANCE = 0.01
 # On which painting nodes say where the part stands.
 PART_POSE_TOPIC = 'part_pose'
-POSE_FORMAT = 'seven numbers, x y z [m] and a unit quaternion qx qy qz qw'
-
-
-def is_pose(values: Sequence[float]) -> bool:
-    """Whether these are seven finite numbers whose last four are nearly a unit quaternion."""
-    if len(values) != 7 or not all(map(math.isfinite, values)):
-        return False
-    return abs(math.hypot(*values[3:]) - 1.0) <= QUATERNION_TOLERANCE
 
 
 def is_frame(frame_id: str, own: str) -> bool:

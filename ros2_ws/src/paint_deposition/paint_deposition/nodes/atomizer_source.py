@@ -20,7 +20,7 @@ from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, Robot
 from paint_deposition.files.recordings.messages import Signal, stamp_ns
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.trajectory import ONLY_BRUSH
-from paint_deposition.motion.transforms import POSE_FORMAT, Rigid, is_pose
+from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.frames import QUEUE_DEPTH, SILENT_S, TfPoses
 from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
@@ -32,7 +32,7 @@ from paint_deposition.nodes.topics import (
     pose_message,
     state_message,
 )
-from paint_deposition.request import MotionOptions
+from paint_deposition.request import POSE_FORMAT, MotionOptions, is_pose
 
 # Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -170,7 +170,7 @@ class AtomizerSource(PaintNode):
         positions_by_name = dict(zip(message.name, message.position, strict=False))
         try:
             found = robot.recorded_joints(positions_by_name, topic)
-            values = np.array([[found[name] for name in robot.moving_joints]])
+            values = np.array([[found[name] for name in robot.arm.joints]])
             if not np.isfinite(values).all():
                 raise RecordingError(f'{topic} has joints that are not finite')
             positions, quaternions = robot.poses(robot.in_si(values, topic))

@@ -1,7 +1,7 @@
 """Running a RAPID program: its control flow and the calls of its routines."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
@@ -10,6 +10,7 @@ from lark import Token
 from paint_deposition.errors import did_you_mean
 from paint_deposition.files.rapid.parser import Datum, Instruction, Node, Routine, line_of
 from paint_deposition.files.rapid.values import Unknown, Values
+from paint_deposition.motion.programmed import Move
 
 MOST_TURNS, MOST_STATEMENTS = 10_000, 100_000
 CHANGING = {'incr': 1.0, 'decr': -1.0, 'add': None, 'clear': 0.0}
@@ -28,12 +29,38 @@ PASSED_OVER = frozenset((
 ))  # fmt: skip
 
 
-class _Return(Exception):
-    """The end of a routine, with its value."""
+@dataclass(frozen=True, kw_only=True)
+class RapidMove(Move):
+    """A move of the TCP as programmed; on the robot, zones cut its corners.
+
+    The pose is in the world frame, or in ``frame``: that of the work object if the modules do not
+    define it, or of the mechanical unit that moves it.
+    """
+
+    instruction: str  # in lower case
+    zone_m: float  # radius in which the corner is cut, 0: stop
+    tool: str
+    work_object: str
+    frame: str = ''  # '' for the world
 
 
-class Exit(Exception):
-    """The end of the program."""
+@dataclass
+class RapidProgram:
+    """The moves in order, and notes on everything left out or assumed, one line each."""
+
+    module: str
+    gun_signal: str = ''  # the digital output that opens the gun
+    moves: list[RapidMove] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def note(self, text: str) -> None:
+        """Note something once."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+
+class Ended(Exception):
+    """The end of a routine, with its value; without one, that of the program."""
 
 
 class Interpreter(Values):
@@ -57,15 +84,17 @@ class Interpreter(Values):
         self.only_options(routine.name, options, optional)
         given = dict(zip(needed, values, strict=True)) | options
         own = {
-            one.name: Datum(one.name, one.type, self.value(given[one.name]))
+            one.name: replace(one, value=self.value(given[one.name]))
             for one in routine.parameters if one.name in given
         }  # fmt: skip
         caller, result = (self._local, self.source, self.line, self._running), None
         self._local, self.source, self._running = own, routine.source, (*self._running, routine)
         try:
             self._execute(routine.body)
-        except _Return as returned:
-            (result,) = returned.args
+        except Ended as ended:
+            if not ended.args:
+                raise
+            (result,) = ended.args
         self._local, self.source, self.line, self._running = caller
         for one in routine.parameters:
             node = given.get(one.name)
@@ -122,9 +151,9 @@ class Interpreter(Values):
         if routine := self.routine(i.name):
             self.call(routine, i.values, i.options)
         elif i.name == 'return':
-            raise _Return(self.value(i.values[0]) if i.values else None)
+            raise Ended(self.value(i.values[0]) if i.values else None)
         elif i.name == 'exit':
-            raise Exit
+            raise Ended
         elif i.name in CHANGING:
             needed = 2 if CHANGING[i.name] is None else 1
             if len(i.values) != needed:

@@ -1,14 +1,21 @@
-"""What a RAPID program does to the robot and the gun: its moves of the TCP."""
+"""What a RAPID program does to the robot and the gun: moves of the TCP, and their spray."""
 
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from paint_deposition.errors import quoted
-from paint_deposition.files.rapid.gun import Gun, RapidMove, name_of
-from paint_deposition.files.rapid.interpreter import PASSED_OVER, Exit
-from paint_deposition.files.rapid.parser import Instruction, Module, Routine
+from paint_deposition.errors import RecordingError, quoted
+from paint_deposition.files.rapid.interpreter import (
+    PASSED_OVER,
+    Ended,
+    Interpreter,
+    RapidMove,
+    RapidProgram,
+)
+from paint_deposition.files.rapid.parser import Instruction, Module, Routine, name_of
 from paint_deposition.files.rapid.values import (
     NOWHERE,
     PREDEFINED,
@@ -19,8 +26,12 @@ from paint_deposition.files.rapid.values import (
     inverse,
     product,
 )
-from paint_deposition.motion.programmed import track
+from paint_deposition.model.eq1_pattern import MOST
+from paint_deposition.motion.programmed import GunSwitch, in_order, track
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
+OUTPUTS = ('setdo', 'set', 'reset', 'setao', 'setgo', 'pulsedo', 'invertdo')
+TRIGGERS = ('triggio', 'triggequip')
 # Instruction -> number of its targets; the last is where it ends.
 MOVES = {
     'movel': 1, 'movej': 1, 'movec': 2, 'paintl': 1, 'paintc': 2, 'triggl': 1, 'triggj': 1,
@@ -32,11 +43,34 @@ HOME = frame(NOWHERE)
 FROM_UNKNOWN_M = 1e6
 
 
-class Painting(Gun):
-    """Collects the moves of a `RapidProgram` while it runs."""
+class Painting(Interpreter):
+    """Collects the moves of a `RapidProgram`, and follows its gun, while it runs."""
 
     def __init__(self, modules: list[Module], start: Routine, signal: str | None) -> None:
-        super().__init__(modules, start, signal)
+        super().__init__(modules)
+        name = next(module.name for module in modules if module.source == start.source)
+        reached = list(self.reached(start.body))
+        signals = sorted({_signal_of(i) for i in reached} - {''})
+        words = ' '.join(signals)
+        if signal is not None:
+            if signal.lower() not in signals:
+                raise RecordingError(
+                    f'{start.source} never sets {signal}; it sets: {words or "none"}'
+                )
+            signals = [signal.lower()]
+        elif any(i.name.startswith('paint') for i in reached):
+            signals = []
+        elif len(signals) > 1:
+            raise RecordingError(
+                f'{start.source} sets {words}; give the one that opens the gun as gun_signal'
+            )
+        self.program = RapidProgram(name, ''.join(signals))
+        self.is_open, self.flow = False, 1.0
+        self.brush: int | None = None  # None: no brush selected yet
+        self._brush_table = ''
+        # Where the TCP passes a plane of the work object and a brush is chosen: axis, place [mm],
+        # brush and line.
+        self.planes: list[tuple[int, float, int, int]] = []
         # Name of the frame and pose of the TCP in it [mm], None where it is not known.
         self._at: tuple[str, Frame] | None = None
         self._displacement = HOME
@@ -46,7 +80,7 @@ class Painting(Gun):
 
     def run(self, start: Routine) -> None:
         """Run the program from the start of a procedure on."""
-        with suppress(Exit):
+        with suppress(Ended):
             self.call(start, [], {})
         if self.planes:
             *_, self.line = self.planes[0]
@@ -75,7 +109,12 @@ class Painting(Gun):
         elif do := getattr(self, f'do_{i.name}', None):
             do(i)
         elif what := self.commanded(i):
-            self.command(i, what)
+            if 'sdelay' in i.options or i.name in ('pulsedo', 'invertdo'):
+                self.fail(f'{i.name} of the gun by time is not followed; give a TriggIO')
+            if what == 'gun':
+                self.is_open = self.level(i)
+            else:
+                setattr(self, what, self._set_to(i, what, 1))
         elif i.name.startswith('wait') and self.is_open:
             self.fail(f'{i.name} waits with the gun open, how long only the robot knows')
         else:
@@ -113,6 +152,123 @@ class Painting(Gun):
             self.fail('moveabsj sprays, and its joint angles are no pose; write it as MoveJ')
         self.program.note(f'line {i.line}: moveabsj skipped: joint angles are no pose')
         self._at = None
+
+    def do_setbrush(self, i: Instruction) -> None:
+        brush = int(self._set_to(i, 'brush', 0))
+        if not i.options:
+            self.brush = brush
+            return
+        (axis, at), *more = i.options.items()
+        if more or axis not in ('x', 'y', 'z'):
+            self.fail(f'setbrush with {" ".join(i.options)}: give one of X, Y and Z')
+        at_mm = self.number(at, 'the plane of setbrush')
+        self.planes.append(('xyz'.index(axis), at_mm, brush, i.line))
+        self.program.note(
+            f'line {i.line}: the brush changes where the TCP passes that plane of the work object'
+        )
+
+    def do_usebrushtab(self, i: Instruction) -> None:
+        table = name_of(i.values[0]) if i.values else ''
+        if self._brush_table not in ('', table):
+            self.fail(
+                f'the brush table {table} after {self._brush_table}: a number would mean two '
+                'brushes; give every brush a number of its own, in SetBrush and in the brushes of '
+                'the model'
+            )
+        self._brush_table = table
+        self.program.note(f'the brushes of the model have to be those of the table {table}')
+
+    def do_triggio(self, i: Instruction) -> None:
+        """Note in the triggdata what of the gun it switches, and to what."""
+        what = self.commanded(i)
+        value: Any = None
+        if what == 'gun':
+            if i.options.get('time'):
+                self.fail(f'{i.name} by time is not followed; give a distance')
+            distance_m = self.argument(i, 1) * 1e-3
+            value = GunSwitch(distance_m, 'start' in i.options, self.level(i))
+        elif what:
+            value = self._set_to(i, what, len(i.values) - 1)
+        self.assign(i.values[0] if i.values else None, (what, value))
+
+    do_triggequip = do_triggio
+
+    # --- the gun
+
+    def commanded(self, i: Instruction) -> str:
+        """Which of the gun, its flow and its brush an instruction sets, '' for none."""
+        if _signal_of(i) == self.program.gun_signal != '':
+            return 'gun'
+        output = i.values[0] if i.values and i.name in OUTPUTS else None
+        of_trigger = i.options.get('aop') or i.options.get('gop')
+        signal = name_of(of_trigger if i.name in TRIGGERS else output)
+        # As the module of a plan sets them: an analogue output and a group output.
+        return {'aoflow': 'flow', 'gobrush': 'brush'}.get(signal, '')
+
+    def level(self, i: Instruction) -> bool:
+        """What an instruction sets its digital output to."""
+        if i.name in ('set', 'reset'):
+            return i.name == 'set'
+        return bool(self.known(i.values[-1]))
+
+    def argument(self, i: Instruction, index: int) -> float:
+        """The value of an argument that must be a number."""
+        if len(i.values) <= index:
+            self.fail(f'{i.name} needs a number as argument {index + 1}')
+        return self.number(i.values[index], f'what {i.name} takes')
+
+    def _set_to(self, i: Instruction, what: str, index: int) -> float:
+        """What an instruction sets the flow, or the brush, to."""
+        number = self.argument(i, index)
+        if what == 'brush':
+            if not (0 <= number <= MOST and number == round(number)):
+                self.fail(f'{i.name} takes the number of a brush, not {number:g}')
+            return int(number)
+        return number
+
+    @property
+    def spray(self) -> dict[str, Any]:
+        """What the gun does in a move that is no paint move, without triggers."""
+        return {'spraying': self.is_open, 'flow': self.flow, 'brush': self.brush or ONLY_BRUSH}
+
+    def spray_in_paint_move(self, track_mm: np.ndarray | None) -> dict[str, Any]:
+        """What the gun does in a paint move.
+
+        ``track_mm`` (2, 3) is its begin and end in the work object, None for what is not straight.
+        """
+        if self.brush is None and not self.planes:
+            self.program.note('no SetBrush: paint moves are taken as spraying')
+        spraying = self.brush != 0 and not (self.brush is None and self.planes)
+        spray, switches, reached = self.spray | {'spraying': spraying}, [], 0.0
+        if self.planes and track_mm is None:
+            self.fail('a plane of SetBrush needs a straight move from a known place')
+        while self.planes and track_mm is not None:
+            axis, at_mm, brush, _ = self.planes[0]
+            begin, end = track_mm[:, axis]
+            share = (at_mm - begin) / (end - begin) if end != begin else -1.0
+            if not reached <= share <= 1.0:
+                break
+            self.planes.pop(0)
+            reached, self.brush = share, brush
+            length_m = float(np.linalg.norm(track_mm[1] - track_mm[0])) * 1e-3
+            switches.append(GunSwitch(share * length_m, True, brush != 0, brush))
+        return spray | {'switches': tuple(switches)}
+
+    def spray_in_move(self, triggers: Iterable[Any], length_m: float) -> dict[str, Any]:
+        """What the gun does in another move, with the values of its triggers."""
+        given = [trigger for trigger in triggers if isinstance(trigger, tuple)]
+        switches = [switch for what, switch in given if what == 'gun']
+        at_start = [switch for switch in switches if switch.from_start and not switch.distance_m]
+        if at_start:
+            self.is_open = at_start[-1].on
+        for what, value in given:
+            if what in ('flow', 'brush'):
+                setattr(self, what, value)
+        later = tuple(switch for switch in switches if switch not in at_start)
+        spray = self.spray | {'switches': later}
+        if later:
+            self.is_open = in_order(later, length_m)[-1][1].on
+        return spray
 
     # --- moves
 
@@ -218,3 +374,14 @@ class Painting(Gun):
         if not isinstance(value, list) or len(value) != len(RECORDS[kind]):
             self.fail(f'{quoted(value)} is no {kind}')
         return value
+
+
+def _signal_of(i: Instruction) -> str:
+    """The digital output that an instruction sets, '' if none."""
+    if i.name in ('setdo', 'set', 'reset', 'pulsedo', 'invertdo') and i.values:
+        return name_of(i.values[0])
+    if i.name in TRIGGERS:
+        return name_of(i.options.get('dop'))
+    if i.name in ('moveldo', 'movejdo', 'movecdo') and len(i.values) > 2:
+        return name_of(i.values[-2])
+    return ''

@@ -34,7 +34,9 @@ class Instruction(NamedTuple):
 class Datum:
     """A datum: its type, the sizes of an array, and its value, None without.
 
-    Until it is first needed (``is_declared``) the value is the expression that it begins with.
+    Until it is first needed (``is_declared``) the value is the expression that it begins with. As
+    a parameter of a routine it may be ``optional``; what is assigned to a ``shared`` one reaches
+    the caller.
     """
 
     name: str
@@ -42,22 +44,15 @@ class Datum:
     value: Any = None
     sizes: list | None = None
     is_declared: bool = False
-
-
-class Parameter(NamedTuple):
-    """A parameter of a routine; what is assigned to a `shared` one reaches the caller."""
-
-    name: str
-    type: str
-    optional: bool
-    shared: bool
+    optional: bool = False
+    shared: bool = False
 
 
 class Routine(NamedTuple):
     """A procedure, function or trap."""
 
     name: str
-    parameters: list[Parameter]
+    parameters: list[Datum]
     body: Node
     source: str
     is_procedure: bool
@@ -123,10 +118,10 @@ class _Builder(Transformer):
     def declaration(self, kind: str, *data: Datum) -> Node:
         return Node('declaration', [replace(datum, type=str(kind)) for datum in data])
 
-    def parameter(self, optional: str | None, mode: str | None, kind: str, name: str) -> Parameter:
-        return Parameter(str(name), str(kind), optional is not None, mode is not None)
+    def parameter(self, optional: str | None, mode: str | None, kind: str, name: str) -> Datum:
+        return Datum(str(name), str(kind), optional=optional is not None, shared=mode is not None)
 
-    def parameters(self, *parameters: Parameter | None) -> list:
+    def parameters(self, *parameters: Datum | None) -> list:
         return [parameter for parameter in parameters if parameter]
 
     def routine(self, *parts: Any) -> Routine:
@@ -144,6 +139,11 @@ class _Builder(Transformer):
 def line_of(token: Token) -> int:
     """Where a word stands; those of a grammar without texts have none."""
     return token.line or 0
+
+
+def name_of(node: object) -> str:
+    """The name that an argument consists of, '' if it is an expression."""
+    return str(node.children[0]) if isinstance(node, Node) and node.rule == 'reference' else ''
 
 
 @cache

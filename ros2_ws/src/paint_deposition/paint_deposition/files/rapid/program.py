@@ -7,7 +7,7 @@ from pathlib import Path
 
 from paint_deposition.errors import PlanError, RecordingError, quoted
 from paint_deposition.files.atomic import MOST_TEXT_MB, filled, read_file
-from paint_deposition.files.rapid.gun import RapidProgram
+from paint_deposition.files.rapid.interpreter import RapidProgram
 from paint_deposition.files.rapid.painting import Painting
 from paint_deposition.files.rapid.parser import Module, Routine, parse_modules
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed

@@ -7,6 +7,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError, quoted
 from paint_deposition.files.rapid.parser import Datum, Module, Node, Routine
-from paint_deposition.motion.transforms import QUATERNION_TOLERANCE
+from paint_deposition.request import QUATERNION_TOLERANCE
 
 # Of one array, and of all lists that are made or copied while a program runs.
 MOST_ELEMENTS, MOST_COPIED = 1_000_000, 10_000_000
@@ -111,22 +112,18 @@ def _pose_mult(first: list, second: list) -> list:
     return [position.tolist(), rotation.as_quat(scalar_first=True).tolist()]
 
 
-def _of_vectors(calculate: Callable) -> Callable:
-    """An operator that takes positions too."""
-
-    def calculated(a: Any, b: Any) -> Any:
-        if not (isinstance(a, list) or isinstance(b, list)):
-            return calculate(a, b)
-        if isinstance(a, list) and isinstance(b, list) and np.shape(a) != np.shape(b):
-            raise ValueError('they have not the same size')
-        return calculate(np.array(a), np.array(b)).tolist()
-
-    return calculated
+def _of_positions(calculate: Callable, a: Any, b: Any) -> Any:
+    """What an operator gives that takes positions too."""
+    if not (isinstance(a, list) or isinstance(b, list)):
+        return calculate(a, b)
+    if isinstance(a, list) and isinstance(b, list) and np.shape(a) != np.shape(b):
+        raise ValueError('they have not the same size')
+    return calculate(np.array(a), np.array(b)).tolist()
 
 
 OPERATORS: dict[str, Callable] = {
-    '+': _of_vectors(operator.add), '-': _of_vectors(operator.sub),
-    '*': _of_vectors(operator.mul), '/': operator.truediv,
+    '+': partial(_of_positions, operator.add), '-': partial(_of_positions, operator.sub),
+    '*': partial(_of_positions, operator.mul), '/': operator.truediv,
     'div': lambda a, b: float(math.trunc(a / b)), 'mod': math.fmod,
     '=': operator.eq, '<>': operator.ne, '<': operator.lt, '>': operator.gt,
     '<=': operator.le, '>=': operator.ge,

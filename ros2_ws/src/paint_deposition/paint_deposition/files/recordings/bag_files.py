@@ -158,7 +158,7 @@ class Bag:
             elif connection.msgtype in standard:  # older sqlite3 bags hold no definitions at all
                 types = dict(standard)
             else:
-                text = definitions.installed(connection.msgtype).text
+                text, _ = definitions.installed(connection.msgtype)
                 types = get_types_from_msg(text, connection.msgtype)
             # For each element of these rosbags would write a line of code.
             entries: list[Any] = [*types.values()]

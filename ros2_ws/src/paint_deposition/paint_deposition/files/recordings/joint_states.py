@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 from xml.etree import ElementTree
@@ -31,18 +30,16 @@ T = TypeVar('T')
 
 @dataclass(frozen=True)
 class Robot:
-    """The kinematic chain from a robot's base link to its tip link, joints of pytransform3d.
+    """The kinematic chain from a robot's base link to its tip link.
 
-    ``fastest`` are the speeds of those that move [rad/s or m/s], infinite where none is said. A
-    recording may have ``joint_prefix`` before the names of the joints, or lack it, and have
+    A recording may have ``joint_prefix`` before the names of the joints, or lack it, and have
     angles and lengths in other units than rad and m, where it does not say them itself.
     """
 
     path: Path
     base: str
     tip: str
-    chain: list[Any]
-    fastest: Mapping[str, float]
+    arm: Arm  # the joints that move
     joint_prefix: str = ''
     angle_unit: str | None = None
     length_unit: str | None = None
@@ -87,50 +84,11 @@ class Robot:
             raise RecordingError(f"{path}: link '{tip}' does not hang on '{base}'; give base_link")
         way = nx.utils.pairwise(nx.shortest_path(parents, tip, base))
         chain = [parents.edges[pair]['joint'] for pair in way][::-1]
-        fastest = {}
-        for joint in (joint for joint in chain if joint.joint_type != 'fixed'):
-            name, limit = joint.joint_name, limits.get(joint.joint_name)
-            if not 0.0 < np.linalg.norm(joint.joint_axis) < np.inf:
-                axis = ' '.join(f'{value:g}' for value in joint.joint_axis)
-                raise RecordingError(f"{path}: the axis of joint '{name}' is {axis}; give one")
-            said, speed = '0' if limit is None else limit.get('velocity', '0'), np.nan
-            with suppress(ValueError):
-                speed = float(said)
-            if not speed >= 0.0:
-                raise RecordingError(
-                    f"{path}: the velocity of joint '{name}' is {quoted(said)}; give a number of "
-                    '0 or more'
-                )
-            fastest[name] = speed or np.inf
-        if not fastest:
+        if all(joint.joint_type == 'fixed' for joint in chain):
             raise RecordingError(
                 f"{path}: no joint between '{base}' and '{tip}' moves; give base_link and tip_link"
             )
-        return Robot(path, base, tip, chain, fastest)
-
-    @property
-    def moving_joints(self) -> list[str]:
-        """Names of the joints that move."""
-        return [joint.joint_name for joint in self.chain if joint.joint_type != 'fixed']
-
-    @cached_property
-    def arm(self) -> Arm:
-        """The joints that move, with their limits."""
-        moving, frames, frame = [], [], np.eye(4)
-        for joint in self.chain:
-            frame = frame @ joint.child2parent
-            if joint.joint_type != 'fixed':
-                moving.append(joint)
-                frames.append(frame)
-                frame = np.eye(4)
-        axes = np.array([joint.joint_axis for joint in moving])
-        lower, upper = np.array([joint.limits for joint in moving]).T
-        return Arm(
-            tuple(self.moving_joints), np.array([*frames, frame]),
-            axes / np.linalg.norm(axes, axis=1, keepdims=True),
-            np.array([joint.joint_type == 'prismatic' for joint in moving]), lower, upper,
-            np.array([*self.fastest.values()]),
-        )  # fmt: skip
+        return Robot(path, base, tip, _arm(path, chain, limits))
 
     def recorded_joints(
         self, names: Mapping[str, T], where: str, numbered: bool = False
@@ -143,7 +101,7 @@ class Robot:
         prefix = _plain(self.joint_prefix)
         plain = {_plain(name): value for name, value in names.items()}
         found: dict[str, T] = {}
-        for joint in self.moving_joints:
+        for joint in self.arm.joints:
             own = _plain(joint)
             ways = [own, prefix + own, own.removeprefix(prefix)][1 if prefix else 0 :]
             known = next((way for way in ways if way in plain), None)
@@ -153,9 +111,9 @@ class Robot:
                 found[joint] = plain[known]
         if numbered and not found:
             by_number = {int(m[1]): v for n, v in plain.items() if (m := NUMBERED.fullmatch(n))}
-            joints = enumerate(self.moving_joints, start=1)
+            joints = enumerate(self.arm.joints, start=1)
             found = {joint: by_number[k] for k, joint in joints if k in by_number}
-        missing = [joint for joint in self.moving_joints if joint not in found]
+        missing = [joint for joint in self.arm.joints if joint not in found]
         if missing or not found:
             raise RecordingError(
                 f'{where} has nothing of {" ".join(missing) or "any joint"} of {self.path.name}; '
@@ -169,22 +127,21 @@ class Robot:
 
         Raises RecordingError for another unit, and for angles that can only be degrees.
         """
-        moving = [joint for joint in self.chain if joint.joint_type != 'fixed']
-        scales = []
-        for joint, column, its in zip(moving, values.T, units or [''] * len(moving), strict=True):
-            slides = joint.joint_type == 'prismatic'
+        arm, scales = self.arm, []
+        furthest = np.nanmax(np.abs(values), axis=0, initial=0.0)
+        for k, joint in enumerate(arm.joints):
+            slides, its = arm.slides[k], units[k] if units else ''
             said = self.length_unit if slides else self.angle_unit
             known, unit = LENGTHS if slides else ANGLES, its or said
             if unit and unit not in known:
                 wanted = 'm or mm' if slides else 'deg or rad'
-                raise RecordingError(f'{joint.joint_name} in {where} is in {unit}; give {wanted}')
-            furthest = float(np.nanmax(np.abs(column), initial=0.0))
-            own = max(map(abs, joint.limits))
+                raise RecordingError(f'{joint} in {where} is in {unit}; give {wanted}')
             # A joint without limits that turns further is recorded in degrees.
+            own = max(abs(arm.lower[k]), abs(arm.upper[k]))
             limit = max(2.0 * np.pi, own if np.isfinite(own) else 1e3)
-            if not slides and not unit and furthest > limit:
+            if not slides and not unit and furthest[k] > limit:
                 raise RecordingError(
-                    f'{joint.joint_name} in {where} reaches {furthest:.4g} and is read in rad; '
+                    f'{joint} in {where} reaches {furthest[k]:.4g} and is read in rad; '
                     'give --angle-unit deg, or rad if it is'
                 )
             scales.append(known[unit or ('m' if slides else 'rad')])
@@ -212,6 +169,39 @@ class Robot:
         """
         positions, axes = self.arm.tips(values)
         return positions, Rotation.from_matrix(axes).as_quat()
+
+
+def _arm(path: Path, chain: Sequence[Any], limits: Mapping[str, Any]) -> Arm:
+    """The joints of a chain of pytransform3d that move, with the limits of the file."""
+    moving, frames, fastest, frame = [], [], [], np.eye(4)
+    for joint in chain:
+        frame = frame @ joint.child2parent
+        if joint.joint_type == 'fixed':
+            continue
+        name, limit = joint.joint_name, limits.get(joint.joint_name)
+        if not 0.0 < np.linalg.norm(joint.joint_axis) < np.inf:
+            axis = ' '.join(f'{value:g}' for value in joint.joint_axis)
+            raise RecordingError(f"{path}: the axis of joint '{name}' is {axis}; give one")
+        said, speed = '0' if limit is None else limit.get('velocity', '0'), np.nan
+        with suppress(ValueError):
+            speed = float(said)
+        if not speed >= 0.0:
+            raise RecordingError(
+                f"{path}: the velocity of joint '{name}' is {quoted(said)}; give a number of 0 or "
+                'more'
+            )
+        moving.append(joint)
+        frames.append(frame)
+        fastest.append(speed or np.inf)
+        frame = np.eye(4)
+    axes = np.array([joint.joint_axis for joint in moving])
+    lower, upper = np.array([joint.limits for joint in moving]).T
+    return Arm(
+        tuple(joint.joint_name for joint in moving), np.array([*frames, frame]),
+        axes / np.linalg.norm(axes, axis=1, keepdims=True),
+        np.array([joint.joint_type == 'prismatic' for joint in moving]), lower, upper,
+        np.array(fastest),
+    )  # fmt: skip
 
 
 def read_joint_poses(
@@ -288,7 +278,7 @@ def read_joint_poses(
             f'{used[ends][0]} until {1e-9 * columns[ends][0][-1]:.3f} s, {begins} on '
             f'{used[begins][0]} from {1e-9 * begin:.3f} s on; record all joints together'
         )
-    each = [columns[recorded[joint]] for joint in robot.moving_joints]
+    each = [columns[recorded[joint]] for joint in robot.arm.joints]
     values = np.stack(
         [np.interp(clock[known] - begin, at - begin, v) for at, _, v in each], axis=1
     )

@@ -9,7 +9,7 @@ from dataclasses import replace
 from io import BytesIO
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, Any, cast
 
 import yaml
 import zstandard
@@ -27,42 +27,31 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.atomic import require_file, require_small
 from paint_deposition.files.recordings.bag_files import MOST_CHUNK_BYTES, expanded, mcap_files
 from paint_deposition.files.recordings.mcap_run import RunWriter
-from paint_deposition.files.recordings.messages import Definition
 
 # Exceptions of the readers on damaged data.
 DAMAGE = (
     McapError, struct.error, zstandard.ZstdError, ValueError, EOFError, RuntimeError,
     OverflowError, KeyError,
 )  # fmt: skip
-
-
-class Recovery(RunWriter):
-    """A new run, of what could be read of another.
-
-    Attributes:
-        damaged_chunks: number of chunks left out because their content is damaged.
-        breaks: where and why reading stopped, one line for each incomplete file.
-        skipped_topics: those that a rosbag2 folder cannot hold (not CDR, or without a schema).
-    """
-
-    def __init__(self, folder: Path | str) -> None:
-        super().__init__(folder)
-        self.damaged_chunks = 0
-        self.breaks: list[str] = []
-        self.skipped_topics: list[str] = []
+Lost = dict[str, Any]  # what could not be read, by its name in the figures
 
 
 def recover(
     path: Path | str,
     folder: Path | str,
     on_bytes: Callable[[int], None] = lambda count: None,
-) -> Recovery:
+) -> tuple[RunWriter, Lost]:
     """Copy every readable message of an .mcap file or a run's folder into the new run `folder`.
 
     QoS, type hashes, custom data and distribution are copied as well.
 
     Args:
         on_bytes: called with the number of bytes read, for a progress bar.
+
+    Returns:
+        The new run, and what could not be read: the number of ``damaged_chunks``; ``breaks``,
+        where and why reading stopped, one line for each incomplete file; ``skipped_topics``,
+        which a rosbag2 folder cannot hold (not CDR, or without a schema).
 
     Raises:
         RecordingError: `path` holds no MCAP file, `folder` exists or cannot be written, or no
@@ -75,21 +64,22 @@ def recover(
     files = mcap_files(path)
     if not files:
         raise RecordingError(f'{path} holds no .mcap file; only MCAP runs can be recovered')
-    recovery = Recovery(folder)
+    run = RunWriter(folder)
+    lost: Lost = {'damaged_chunks': 0, 'breaks': [], 'skipped_topics': []}
     try:
-        with recovery:
+        with run:
             for file in files:
-                _copy(file, recovery, on_bytes)
-            if not recovery.message_count:
-                reason = '; '.join(recovery.breaks) or 'no messages'
+                _copy(file, run, lost, on_bytes)
+            if not run.message_count:
+                reason = '; '.join(lost['breaks']) or 'no messages'
                 raise RecordingError(f'nothing to recover in {path}: {reason}')
     except BaseException:
-        shutil.rmtree(recovery.folder, ignore_errors=True)
+        shutil.rmtree(run.folder, ignore_errors=True)
         raise
-    return recovery
+    return run, lost
 
 
-def _copy(file: Path, recovery: Recovery, on_bytes: Callable[[int], None]) -> None:
+def _copy(file: Path, run: RunWriter, lost: Lost, on_bytes: Callable[[int], None]) -> None:
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     # The summary, if any, repeats all channels, in case the chunk that defines one is damaged.
@@ -97,7 +87,7 @@ def _copy(file: Path, recovery: Recovery, on_bytes: Callable[[int], None]) -> No
         reader = SeekingReader(stream, record_size_limit=file.stat().st_size)
         if summary := reader.get_summary():
             schemas, channels = dict(summary.schemas), dict(summary.channels)
-    for record in _records(file, recovery, on_bytes):
+    for record in _records(file, lost, on_bytes):
         if isinstance(record, Schema):
             schemas[record.id] = record
         elif isinstance(record, Metadata) and record.name == 'rosbag2':
@@ -107,32 +97,26 @@ def _copy(file: Path, recovery: Recovery, on_bytes: Callable[[int], None]) -> No
                 require_small(text)
                 content = yaml.safe_load(text)
                 custom = content.get('custom_data') or {}
-                recovery.custom_data = {key: str(value) for key, value in custom.items()}
-                recovery.ros_distro = content.get('ros_distro') or recovery.ros_distro
+                run.custom_data = {key: str(value) for key, value in custom.items()}
+                run.ros_distro = content.get('ros_distro') or run.ros_distro
         elif isinstance(record, Channel):
             channels[record.id] = record
         if isinstance(record, Channel | Message):
             channel = record if isinstance(record, Channel) else channels.get(record.channel_id)
             if channel is not None:
-                kept = _ensure_topic(channel, schemas.get(channel.schema_id), recovery)
+                kept = _ensure_topic(channel, schemas.get(channel.schema_id), run, lost)
                 if kept and isinstance(record, Message):
-                    times_ns = record.log_time, record.publish_time
-                    recovery.write(channel.topic, record.data, *times_ns)
+                    run.write(channel.topic, record.data, record.log_time, record.publish_time)
 
 
-def _records(
-    file: Path, recovery: Recovery, on_bytes: Callable[[int], None]
-) -> Iterator[McapRecord]:
+def _records(file: Path, lost: Lost, on_bytes: Callable[[int], None]) -> Iterator[McapRecord]:
     """The records up to the break, which is noted, including those in chunks."""
     size, start = file.stat().st_size, len(MCAP0_MAGIC)
     with _mapped(file) as stream:
         reader = StreamReader(stream, emit_chunks=True, record_size_limit=size)
         try:
             for record in reader.records:
-                if isinstance(record, Chunk):
-                    yield from _chunk_records(record, recovery)
-                else:
-                    yield record
+                yield from _chunk_records(record, lost) if isinstance(record, Chunk) else [record]
                 if isinstance(record, Footer):
                     return
                 on_bytes(stream.tell() - start)
@@ -140,7 +124,7 @@ def _records(
         except DAMAGE as error:
             cut = stream.tell() >= size or isinstance(error, RecordLengthLimitExceeded)
             reason = 'the end is missing' if cut else str(error)
-            recovery.breaks.append(f'{file.name} breaks off at byte {start} of {size}: {reason}')
+            lost['breaks'].append(f'{file.name} breaks off at byte {start} of {size}: {reason}')
             stream.seek(start)
             yield from _truncated_chunk_records(stream.read(MOST_CHUNK_BYTES))
 
@@ -152,7 +136,7 @@ def _mapped(file: Path) -> Iterator[IO[bytes]]:
         yield cast(IO[bytes], content)
 
 
-def _chunk_records(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
+def _chunk_records(chunk: Chunk, lost: Lost) -> list[McapRecord]:
     try:
         data = chunk.data
         if chunk.compression:
@@ -163,7 +147,7 @@ def _chunk_records(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
             raise ValueError('a chunk has another size than it says')
         return breakup_chunk(replace(chunk, compression='', data=data), validate_crc=True)
     except DAMAGE:
-        recovery.damaged_chunks += 1
+        lost['damaged_chunks'] += 1
         return []
 
 
@@ -184,19 +168,19 @@ def _truncated_chunk_records(record: bytes) -> Iterator[McapRecord]:
         return
 
 
-def _ensure_topic(channel: Channel, schema: Schema | None, recovery: Recovery) -> bool:
+def _ensure_topic(channel: Channel, schema: Schema | None, run: RunWriter, lost: Lost) -> bool:
     """Add a channel's topic to the run; False if a rosbag2 folder cannot hold it."""
-    if channel.topic in recovery.counts:
+    if channel.topic in run.counts:
         return True
     if schema is None or channel.message_encoding != 'cdr':
-        if channel.topic not in recovery.skipped_topics:
-            recovery.skipped_topics.append(channel.topic)
+        if channel.topic not in lost['skipped_topics']:
+            lost['skipped_topics'].append(channel.topic)
         return False
     text = schema.data.decode(errors='replace')
     try:
         qos = parse_qos(channel.metadata.get('offered_qos_profiles', ''))
     except (ReaderError, KeyError, TypeError, AttributeError):
         qos = []  # damaged; players take their default then
-    definition = Definition(text, channel.metadata.get('topic_type_hash', ''), schema.encoding)
-    recovery.add_topic(channel.topic, schema.name, definition, qos)
+    definition = text, channel.metadata.get('topic_type_hash', '')
+    run.add_topic(channel.topic, schema.name, definition, qos, schema.encoding)
     return True

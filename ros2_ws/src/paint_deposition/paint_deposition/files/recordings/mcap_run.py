@@ -104,17 +104,22 @@ class RunWriter(AbstractContextManager):
         return sum(self.counts.values())
 
     def add_topic(
-        self, name: str, message_type: str, definition: Definition, offered: Sequence[Qos] = ()
+        self,
+        name: str,
+        message_type: str,
+        definition: Definition,
+        offered: Sequence[Qos] = (),
+        encoding: str = 'ros2msg',
     ) -> None:
         """Add a topic, which is listed in the metadata even without messages.
 
-        ``offered`` are the profiles of its publishers.
+        ``offered`` are the profiles of its publishers, ``encoding`` is that of the definition.
         """
-        qos, type_hash = dump_qos_v9(list(offered)), definition.type_hash
+        qos, (text, type_hash) = dump_qos_v9(list(offered)), definition
         with self._write_errors():
             if message_type not in self._schemas:
                 self._schemas[message_type] = self._writer.register_schema(
-                    message_type, definition.encoding, definition.text.encode()
+                    message_type, encoding, text.encode()
                 )
             about = {'offered_qos_profiles': _yaml(qos).strip(), 'topic_type_hash': type_hash}
             self._channels[name] = self._writer.register_channel(

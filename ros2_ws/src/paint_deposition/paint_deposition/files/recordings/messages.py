@@ -17,7 +17,7 @@ from rosbags.typesys.store import Typestore
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.pose_stream import FARTHEST_M, TriggerChange
 from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
-from paint_deposition.motion.transforms import is_pose
+from paint_deposition.request import is_pose
 
 SEPARATOR = '=' * 80
 # Definitions of the messages that are serialised without a ROS installation.
@@ -40,16 +40,9 @@ float64 programmed_speed_m_per_s
 """
 
 
-@dataclass(frozen=True)
-class Definition:
-    """A message type: its .msg text and, behind separators, that of each type it uses.
-
-    ``type_hash`` is `RIHS01_...` of REP-2016, '' when unknown; ``encoding`` that of the schema.
-    """
-
-    text: str
-    type_hash: str = ''
-    encoding: str = 'ros2msg'
+# Of a message type: its .msg text and, behind separators, that of each type it uses; its hash,
+# `RIHS01_...` of REP-2016, '' when unknown.
+Definition = tuple[str, str]
 
 
 @functools.cache
@@ -79,7 +72,7 @@ def installed(message_type: str) -> Definition:
         parts.append(f'{SEPARATOR}\nMSG: {package}/{name}\n{text}')
     description = json.loads(_share_file(message_type, '.json').read_text())
     hashes = {entry['type_name']: entry['hash_string'] for entry in description['type_hashes']}
-    return Definition('\n'.join(parts), hashes.get(message_type, ''))
+    return '\n'.join(parts), hashes.get(message_type, '')
 
 
 @functools.cache
@@ -95,7 +88,7 @@ def standard(message_type: str) -> Definition:
     """Definition of a message that can be written without ROS."""
     store = own_types()
     text, _ = store.generate_msgdef(message_type, ros_version=2)
-    return Definition(text, store.hash_rihs01(message_type))
+    return text, store.hash_rihs01(message_type)
 
 
 def _share_file(message_type: str, suffix: str) -> Path:

@@ -245,12 +245,6 @@ class PoseSource:
     options: str = ''
     faults: tuple[str, ...] = ()
 
-    def to_dict(self) -> dict[str, object]:
-        """All figures by name."""
-        figures = {} if self.quality is None else vars(self.quality)
-        own = {name: value for name, value in vars(self).items() if name != 'quality'}
-        return own | figures | {'will_do': self.quality is not None}
-
 
 def sources_of_poses(bag: Bag, max_gap_s: float) -> Iterator[PoseSource]:
     """The sources of poses in a bag: topics, joints, transforms that move.

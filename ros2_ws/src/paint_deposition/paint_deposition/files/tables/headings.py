@@ -161,14 +161,14 @@ def find_table(
     wide_enough = [s for s in sheets if sum(len(r) >= columns for r in s.rows) > len(s.rows) / 2]
     if columns and wide_enough:
         return wide_enough[0], None
-    return max(sheets, key=lambda s: (_is_even(s), len(widest(s)))), None
 
+    def likely(one: Sheet) -> tuple[bool, int]:
+        """Whether most rows have as many cells as the widest one, not one only; how many."""
+        cells = [len(row) for row in one.rows[:MOST_LINES_ABOVE]]
+        most = max(cells, default=0)
+        return most > 1 and 2 * cells.count(most) > len(cells), len(widest(one))
 
-def _is_even(sheet: Sheet) -> bool:
-    """Whether most rows have as many cells as the widest one, and not one only."""
-    cells = [len(row) for row in sheet.rows[:MOST_LINES_ABOVE]]
-    most = max(cells, default=0)
-    return most > 1 and 2 * cells.count(most) > len(cells)
+    return max(sheets, key=likely), None
 
 
 def _on_two_rows(sheet: Sheet, first: int) -> Sheet | None:

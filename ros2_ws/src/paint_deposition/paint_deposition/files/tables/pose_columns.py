@@ -1,7 +1,6 @@
 """The columns of a table of poses, known by their names."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from functools import partial
 from pathlib import Path
@@ -22,6 +21,7 @@ from paint_deposition.files.tables.headings import (
 )
 from paint_deposition.files.tables.sheets import text_of
 from paint_deposition.files.tables.table import Table
+from paint_deposition.request import CONVENTIONS, ROTATION_WORDS
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
@@ -38,105 +38,100 @@ ROTATED = {
 }
 
 
-@dataclass
-class PoseTable(Table):
-    """A table whose columns are found by their names, see ``column_name``."""
+def read_columns(path: Path, robot: 'Robot | None' = None) -> Table:
+    """Find the headings and the rows below them; without them the file is refused.
 
-    names: list[str] = field(default_factory=list)
+    With a robot, the columns are those of its joints.
+    """
+    alone = 'a motion is read from a file with one such sheet: save it by itself'
+    known = partial(_known, robot=robot)
+    sheet, header = find_table(path, RecordingError, known, several=alone)
+    if header is None:
+        first = ', '.join(map(text_of, sheet.rows[0])) if sheet.rows else 'none'
+        if robot is not None and sheet.rows:
+            robot.recorded_joints(_by_text(headings_in(sheet.rows[0])), str(path), True)
+        raise RecordingError(
+            f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first}); '
+            'joints are read with --urdf'
+        )
+    headings = headings_in(sheet.rows[header])
+    headings, below = rows_below(sheet, headings, header + 1)
+    table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError)
+    table = table.select(below)
+    if not len(table):
+        raise table.error('no poses below the row of headings')
+    for k, row in enumerate(table.rows):
+        if any(cell != '' for cell in row[len(headings) :]):
+            table.add_width_error(k)
+    table.refuse_errors()
+    table = table.without_units_in_cells(range(len(headings)))
+    if not sheet.form.startswith('commas'):
+        table = table.with_decimal(range(len(headings)), certain=False)
+    return table
 
-    @staticmethod
-    def read(path: Path, robot: 'Robot | None' = None) -> 'PoseTable':
-        """Find the headings and the rows below them; without them the file is refused.
 
-        With a robot, the columns are those of its joints.
-        """
-        alone = 'a motion is read from a file with one such sheet: save it by itself'
-        known = partial(_known, robot=robot)
-        sheet, header = find_table(path, RecordingError, known, several=alone)
-        if header is None:
-            first = ', '.join(map(text_of, sheet.rows[0])) if sheet.rows else 'none'
-            if robot is not None and sheet.rows:
-                robot.recorded_joints(_by_text(headings_in(sheet.rows[0])), str(path), True)
-            raise RecordingError(
-                f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first}); '
-                'joints are read with --urdf'
-            )
-        headings = headings_in(sheet.rows[header])
-        names = [column_name(heading) for heading in headings]
-        headings, below = rows_below(sheet, headings, header + 1)
-        table = PoseTable(
-            path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names
-        ).select(below)
-        if not len(table):
-            raise table.error('no poses below the row of headings')
-        for k, row in enumerate(table.rows):
-            if any(cell != '' for cell in row[len(headings) :]):
-                table.add_width_error(k)
-        table.refuse_errors()
-        table = table.without_units_in_cells(range(len(headings)))
-        if not sheet.form.startswith('commas'):
-            table = table.with_decimal(range(len(headings)), certain=False)
-        return table
+def find(table: Table, *names: str) -> int | None:
+    """The column called by the first of these names that occurs; two of a name are refused."""
+    for name in names:
+        found = [k for k, its in enumerate(table.headings) if column_name(its) == name]
+        if len(found) > 1:
+            raise RecordingError(f'{table.written(found)} could all be {name}; keep one')
+        if found:
+            return found[0]
+    return None
 
-    def find(self, *names: str) -> int | None:
-        """The column called by the first of these names that occurs; two of a name are refused."""
-        for name in names:
-            found = [column for column, its in enumerate(self.names) if its == name]
-            if len(found) > 1:
-                raise RecordingError(f'{self.written(found)} could all be {name}; keep one')
-            if found:
-                return found[0]
-        return None
 
-    def find_all(self, names: Sequence[str]) -> list[int] | None:
-        """The columns of all these names, None if one of them is missing."""
-        found = [column for name in names if (column := self.find(name)) is not None]
-        return found if len(found) == len(names) else None
+def find_all(table: Table, names: Sequence[str]) -> list[int] | None:
+    """The columns of all these names, None if one of them is missing."""
+    found = [column for name in names if (column := find(table, name)) is not None]
+    return found if len(found) == len(names) else None
 
-    def joints(self, robot: 'Robot') -> tuple[np.ndarray, dict[str, str]]:
-        """The values (N, J) of a robot's moving joints [rad or m], and their headings."""
-        columns = robot.recorded_joints(_by_text(self.headings), str(self.path), numbered=True)
-        units = [self.headings[column].unit for column in columns.values()]
-        values = robot.in_si(self.values([*columns.values()]), str(self.path), units)
-        return values, {joint: self.headings[column].text for joint, column in columns.items()}
 
-    def units(self, columns: Sequence[int]) -> set[str]:
-        """The units of columns, '' for one without."""
-        return {self.headings[column].unit for column in columns}
+def joints_of(table: Table, robot: 'Robot') -> tuple[np.ndarray, dict[str, str]]:
+    """The values (N, J) of a robot's moving joints [rad or m], and their headings."""
+    columns = robot.recorded_joints(_by_text(table.headings), str(table.path), numbered=True)
+    units = [table.headings[column].unit for column in columns.values()]
+    values = robot.in_si(values_of(table, [*columns.values()]), str(table.path), units)
+    return values, {joint: table.headings[column].text for joint, column in columns.items()}
 
-    def values(self, columns: Sequence[int]) -> np.ndarray:
-        """The numbers (N, C) of columns; cells that are none are refused with their lines."""
-        read = [self.numbers(column, finite=False, switch=True) for column in columns]
-        self.refuse_errors()
-        return np.stack(read, axis=1)
 
-    def stamps_ns(self, column: int) -> tuple[np.ndarray, str]:
-        """Times (N,) int64 [ns], exact, and their unit."""
-        (unit,) = self.units([column])
-        written = self.written([column])
-        if (unit or 's') not in TIMES:
-            raise RecordingError(f"{written}: '{unit}' is no unit of time")
-        scale = TIMES[unit or 's']
-        if clock := next((text for text in self.texts(column) if ':' in text), ''):
-            raise RecordingError(
-                f"{written} has the time of day '{clock}'; give seconds, as time_s"
-            )
-        times = self.values([column])[:, 0]
-        if not np.isfinite(times).all():
-            raise RecordingError(f'{written} has a time that is not finite')
-        # Written out, a time of a few letters may have a thousand million digits.
-        span_s = (times.max() - times.min()) * scale
-        # No run is longer: the unit is another one.
-        if span_s > 1e6 or np.abs(times).max() * scale * 1e9 >= 2**63:
-            raise RecordingError(
-                f'{written} spans {span_s:.3g} s; write its unit in the heading, as in time [ms]'
-            )
-        try:
-            cells = [text.replace(',', '.').replace('−', '-') for text in self.texts(column)]
-            stamps = [round(Decimal(cell) * round(scale * 1e9)) for cell in cells]
-        except InvalidOperation:
-            raise RecordingError(f'{written} has a word for a number; give numbers') from None
-        return np.array(stamps, dtype=np.int64), unit or 's'
+def units_of(table: Table, columns: Sequence[int]) -> set[str]:
+    """The units of columns, '' for one without."""
+    return {table.headings[column].unit for column in columns}
+
+
+def values_of(table: Table, columns: Sequence[int]) -> np.ndarray:
+    """The numbers (N, C) of columns; cells that are none are refused with their lines."""
+    read = [table.numbers(column, finite=False, switch=True) for column in columns]
+    table.refuse_errors()
+    return np.stack(read, axis=1)
+
+
+def stamps_of(table: Table, column: int) -> tuple[np.ndarray, str]:
+    """Times (N,) int64 [ns], exact, and their unit."""
+    (unit,) = units_of(table, [column])
+    written = table.written([column])
+    if (unit or 's') not in TIMES:
+        raise RecordingError(f"{written}: '{unit}' is no unit of time")
+    scale = TIMES[unit or 's']
+    if clock := next((text for text in table.texts(column) if ':' in text), ''):
+        raise RecordingError(f"{written} has the time of day '{clock}'; give seconds, as time_s")
+    times = values_of(table, [column])[:, 0]
+    if not np.isfinite(times).all():
+        raise RecordingError(f'{written} has a time that is not finite')
+    # Written out, a time of a few letters may have a thousand million digits.
+    span_s = (times.max() - times.min()) * scale
+    # No run is longer: the unit is another one.
+    if span_s > 1e6 or np.abs(times).max() * scale * 1e9 >= 2**63:
+        raise RecordingError(
+            f'{written} spans {span_s:.3g} s; write its unit in the heading, as in time [ms]'
+        )
+    try:
+        cells = [text.replace(',', '.').replace('−', '-') for text in table.texts(column)]
+        stamps = [round(Decimal(cell) * round(scale * 1e9)) for cell in cells]
+    except InvalidOperation:
+        raise RecordingError(f'{written} has a word for a number; give numbers') from None
+    return np.array(stamps, dtype=np.int64), unit or 's'
 
 
 def column_name(heading: Heading) -> str:
@@ -177,19 +172,10 @@ ANGLE_COLUMNS = (
     (('phi', 'theta', 'psi'), '', False), (('e1', 'e2', 'e3'), '', False),
     (('o', 'a', 't'), '', False),
 )  # fmt: skip
-# Makers' conventions in the letters of scipy: capital letters turn about the axes of the tool as
-# it goes, small ones about those of the world.
-CONVENTIONS = {
-    'kuka': 'ZYX', 'abb': 'ZYX', 'fanuc': 'xyz', 'rpy': 'xyz', 'staubli': 'XYZ', 'kawasaki': 'ZYZ',
-}  # fmt: skip
-ROTATION_WORDS = (
-    "'rotvec' for a rotation vector, three letters for Euler angles (ZYX about the axes of the "
-    'tool, xyz about fixed axes), or kuka, abb, fanuc, rpy, staubli, kawasaki'
-)
 
 
 def read_rotations(
-    table: PoseTable, rotation: str | None, angle_unit: str | None
+    table: Table, rotation: str | None, angle_unit: str | None
 ) -> tuple[np.ndarray, str]:
     """Quaternions (N, 4), scalar last, and how they were read.
 
@@ -199,18 +185,18 @@ def read_rotations(
     """
     if rotation is None:
         for names in (QUATERNION, SCALAR_FIRST):
-            if columns := table.find_all(names):
+            if columns := find_all(table, names):
                 order = 'scalar last' if names == QUATERNION else 'q1 the scalar'
                 note = f'quaternion {table.written(columns)} ({order})'
-                return table.values(columns), note
+                return values_of(table, columns), note
     columns, by_axis, convention = _angle_columns(table, rotation)
-    written, units = table.written(columns), table.units(columns)
+    written, units = table.written(columns), units_of(table, columns)
     if units not in ({'deg'}, {'rad'}, {''}):
         found = ', '.join(sorted(units))
         raise RecordingError(f'{written} in {found}; give all in deg or in rad')
     of_maker = 'deg' if convention in {*CONVENTIONS} - {'rpy'} else 'rad'
     unit = units.pop() or angle_unit or of_maker
-    angles = table.values(columns) * ANGLES[unit]
+    angles = values_of(table, columns) * ANGLES[unit]
     largest = np.nanmax(np.abs(angles), initial=0.0)
     if unit == 'rad' and largest > 2.0 * np.pi + 1e-6:
         raise RecordingError(
@@ -227,12 +213,12 @@ def read_rotations(
     return Rotation.from_euler(sequence, angles).as_quat(), how
 
 
-def _angle_columns(table: PoseTable, rotation: str | None) -> tuple[list[int], bool, str]:
+def _angle_columns(table: Table, rotation: str | None) -> tuple[list[int], bool, str]:
     """The three columns, whether each is that of an axis, x y z, and what they are."""
     for names, usual, by_axis in ANGLE_COLUMNS:
-        if columns := table.find_all(names):
+        if columns := find_all(table, names):
             doubt = '' if usual else 'are Euler angles of an unknown convention'
-            if usual == 'rotvec' and 'deg' in table.units(columns):
+            if usual == 'rotvec' and 'deg' in units_of(table, columns):
                 doubt = 'in degrees may be Euler angles or a rotation vector'
             if doubt and not rotation:
                 raise RecordingError(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,13 +17,19 @@ from paint_deposition.files.tables.pose_columns import (
     ROLL_PITCH_YAW,
     ROTATION_VECTOR,
     SCALAR_FIRST,
-    PoseTable,
     column_name,
+    find,
+    find_all,
+    joints_of,
+    read_columns,
     read_rotations,
+    stamps_of,
+    units_of,
+    values_of,
 )
 from paint_deposition.files.tables.reading_columns import Layout, columns_of
 from paint_deposition.files.tables.sheets import read_sheets
-from paint_deposition.files.tables.table import SWITCHED
+from paint_deposition.files.tables.table import SWITCHED, Table
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.stream_quality import FARTHEST_PART_M, StreamQuality
@@ -88,7 +95,7 @@ def read_pose_table(
     Raises:
         RecordingError: naming the file, the column and the remedy.
     """
-    table = PoseTable.read(path, robot)
+    table = read_columns(path, robot)
     try:
         return _motion(table, robot, options)
     except RecordingError as error:
@@ -96,32 +103,35 @@ def read_pose_table(
         raise RecordingError(f'{path}: {reason}') from None
 
 
-def _motion(table: PoseTable, robot: 'Robot | None', options: MotionOptions) -> Trajectory:
+def _motion(table: Table, robot: 'Robot | None', options: MotionOptions) -> Trajectory:
     """The poses with their times or speeds, and with what switches the gun."""
-    flows, by_trigger = _flows(table, options.state_topic)
+    flows, by_trigger, warnings = _flows(table, options.state_topic)
     brushes, by_brush = _brushes(table)
     if flows is None and brushes.any():
-        flows = np.ones(len(brushes))
+        flows, warnings = np.ones(len(brushes)), ()
     # Beside o and a, the letter t is an angle of Kawasaki's.
-    times = TIME[:-1] if table.find('o') is not None and table.find('a') is not None else TIME
-    time, speed = table.find(*times), None if robot else table.find(*SPEED)
+    times = TIME[:-1] if find(table, 'o') is not None and find(table, 'a') is not None else TIME
+    time, speed = find(table, *times), None if robot else find(table, *SPEED)
     if time is None and speed is None:
         or_speed = '' if robot else ', or speed_m_per_s for programmed passes'
         raise RecordingError(
             f'no time among the columns {table.written(())}; give a column time_s{or_speed}'
         )
-    stamps, unit = (np.zeros(len(table), np.int64), '') if time is None else table.stamps_ns(time)
+    stamps, unit = (np.zeros(len(table), np.int64), '') if time is None else stamps_of(table, time)
     if robot is not None:
-        joints, recorded = table.joints(robot)
+        joints, recorded = joints_of(table, robot)
         poses = robot.trajectory(stamps, joints, recorded, table.path.name)
         (how,) = poses.notes
     else:
         positions, its_unit = _positions_m(table, options.pose_unit)
         quaternions, its_rotation = read_rotations(table, options.rotation, options.angle_unit)
-        poses = Trajectory(stamps, positions, quaternions, _frame(table))
+        frame = find(table, 'frame', 'frameid')
+        names = set() if frame is None else {*table.texts(frame)}
+        if len(names) > 1:
+            raise RecordingError(f'poses in frames {", ".join(sorted(names))}; give one frame')
+        poses = Trajectory(stamps, positions, quaternions, ''.join(names).lstrip('/'))
         how = f'{len(table)} poses: x y z in {its_unit}; {its_rotation}'
     note = f'{how}; {by_trigger}{by_brush}'
-    warnings = () if flows is not None else _could_be_trigger(table)
     if time is None and speed is not None:
         programmed = timed(_moves(table, poses, speed, flows, brushes), flows is not None)
         return replace(
@@ -137,27 +147,18 @@ def _motion(table: PoseTable, robot: 'Robot | None', options: MotionOptions) -> 
         poses,
         trigger_stamps_ns=stamps,
         trigger_flow=flows,
-        trigger_brush=np.array(brushes, np.int64),
+        trigger_brush=brushes,
     )
 
 
-def _frame(table: PoseTable) -> str:
-    """The frame that a column names, '' for none."""
-    column = table.find('frame', 'frameid')
-    names = set() if column is None else {*table.texts(column)}
-    if len(names) > 1:
-        raise RecordingError(f'poses in frames {", ".join(sorted(names))}; give one frame')
-    return ''.join(names).lstrip('/')
-
-
 def _moves(
-    table: PoseTable, poses: Trajectory, speed: int, flows: np.ndarray | None, brushes: np.ndarray
+    table: Table, poses: Trajectory, speed: int, flows: np.ndarray | None, brushes: np.ndarray
 ) -> list[Move]:
     """Each row as the move to its pose at its speed."""
-    (unit,) = table.units([speed])
+    (unit,) = units_of(table, [speed])
     if (unit or 'm/s') not in SPEEDS:
         raise RecordingError(f"{table.written([speed])}: '{unit}' is no unit of speed")
-    speeds = table.values([speed])[:, 0] * SPEEDS[unit or 'm/s']
+    speeds = values_of(table, [speed])[:, 0] * SPEEDS[unit or 'm/s']
     spraying = np.ones(len(speeds)) if flows is None else flows
     columns = (speeds.tolist(), spraying.tolist(), table.lines, brushes.tolist())
     return [
@@ -168,15 +169,15 @@ def _moves(
     ]
 
 
-def _positions_m(table: PoseTable, given: str | None) -> tuple[np.ndarray, str]:
+def _positions_m(table: Table, given: str | None) -> tuple[np.ndarray, str]:
     """Positions (N, 3) [m], and their unit as it was understood."""
-    columns = table.find_all(POSITION) or []
-    units = table.units(columns)
+    columns = find_all(table, POSITION) or []
+    units = units_of(table, columns)
     if len(units) > 1 or not units <= {'', 'm', 'mm', 'cm'}:
         found = ', '.join(sorted(unit or 'no unit' for unit in units))
         raise RecordingError(f'{table.written(columns)} in {found}; give all in m or in mm')
     unit = units.pop() or given or ''
-    positions = table.values(columns) * LENGTHS[unit or 'm']
+    positions = values_of(table, columns) * LENGTHS[unit or 'm']
     largest = float(np.nanmax(np.abs(positions), initial=0.0))
     if not unit and largest > FARTHEST_PART_M:
         raise RecordingError(
@@ -186,51 +187,44 @@ def _positions_m(table: PoseTable, given: str | None) -> tuple[np.ndarray, str]:
     return positions, unit or 'm (no unit is given)'
 
 
-def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
-    """Flow (N,) from each row on, relative to the calibrated one, and how it was read."""
+def _flows(table: Table, name: str | None) -> tuple[np.ndarray | None, str, tuple[str, ...]]:
+    """Flow (N,) from each row on, relative to the calibrated one, how it was read, warnings."""
     texts = [heading.text for heading in table.headings]
     if name is None:
-        trigger, flow = table.find(*TRIGGER), table.find(*FLOW)
+        trigger, flow = find(table, *TRIGGER), find(table, *FLOW)
     elif name.strip() in texts:
-        trigger, flow = texts.index(name.strip()), table.find(*FLOW)
+        trigger, flow = texts.index(name.strip()), find(table, *FLOW)
         if trigger == flow:  # with a unit it says only whether the gun is on
-            trigger, flow = (None, flow) if table.units([flow]) == {''} else (trigger, None)
+            trigger, flow = (None, flow) if units_of(table, [flow]) == {''} else (trigger, None)
     else:
         raise RecordingError(f'no column is called {name}; {did_you_mean(name, texts)}')
     if trigger is None and flow is None:
-        return None, 'no trigger, the gun sprays throughout'
-    if flow is not None and table.units([flow]) != {''}:
+        each = [{its.lower() for its in table.texts(k)} for k in range(len(texts))]
+        switched = [len(its) > 1 and its <= {'0', '1', *SWITCHED} for its in each]
+        doubts: tuple[str, ...] = ()
+        if named := ', '.join(filter(None, compress(texts, switched))):
+            doubt = f'the gun counts as always on; if {named} is its trigger'
+            doubts = (f'{doubt}, give --trigger NAME',)
+        return None, 'no trigger, the gun sprays throughout', doubts
+    if flow is not None and units_of(table, [flow]) != {''}:
         raise RecordingError(
             f'{table.written([flow])}: the flow is relative to the calibrated one, 1 for the '
             'same; divide by it and drop the unit'
         )
     used = [column for column in (trigger, flow) if column is not None]
-    values = table.values(used)
+    values = values_of(table, used)
     on = np.nan_to_num(values[:, 0]) != 0.0
     relative = values[:, -1] if flow is not None else np.full(len(on), np.nan)
     flows = [relative_flow(bool(a), float(b)) for a, b in zip(on, relative, strict=True)]
-    return np.array(flows), f'gun by {table.written(used)}'
+    return np.array(flows), f'gun by {table.written(used)}', ()
 
 
-def _could_be_trigger(table: PoseTable) -> tuple[str, ...]:
-    """A warning of columns that say on and off and are not used, if there are any."""
-    columns = []
-    for column, heading in enumerate(table.headings):
-        seen = {text.lower() for text in table.texts(column)}
-        if len(seen) > 1 and seen <= {'0', '1', *SWITCHED}:
-            columns.append(heading.text)
-    named = ', '.join(filter(None, columns))
-    if not named:
-        return ()
-    return (f'the gun counts as always on; if {named} is its trigger, give --trigger NAME',)
-
-
-def _brushes(table: PoseTable) -> tuple[np.ndarray, str]:
+def _brushes(table: Table) -> tuple[np.ndarray, str]:
     """Number of the brush (N,) from each row on, and how it was read."""
-    column = table.find(*BRUSH)
+    column = find(table, *BRUSH)
     if column is None:
         return np.full(len(table), ONLY_BRUSH, np.int64), ''
-    values, written = table.values([column])[:, 0], table.written([column])
+    values, written = values_of(table, [column])[:, 0], table.written([column])
     strange = np.flatnonzero(~((values >= 0) & (values <= MOST) & (values == np.round(values))))
     if len(strange):
         raise RecordingError(

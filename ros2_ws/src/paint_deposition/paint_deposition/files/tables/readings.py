@@ -63,6 +63,11 @@ class ReadingTable(Table):
     # What each column of the thickness is a layer of; none where it is not.
     layers: list[str] = field(default_factory=list)
     left_out: str = ''  # what was not taken for a row, for the user
+    # Of a list of points: where they are (N, 3) in the mesh frame [m], outward unit normals, and
+    # that in words.
+    positions_m: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+    normals: np.ndarray | None = None
+    place_words: str = ''
 
     @staticmethod
     def read(
@@ -81,10 +86,7 @@ class ReadingTable(Table):
         thick = table.at['thickness'] if films else []
         table.layers = layers_of(table.headings, layout, thick)
         refuse_misleading(table, table.at, layout, table.layers, bare)
-        # The cells: one reading in each, its unit in the heading, and n/a for what is none.
-        if films and not table.layers:
-            table, thick = table.with_repeats_apart(thick)
-            table.at['thickness'] = thick
+        # The cells: the unit of their readings in the heading, and n/a for what is none.
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in table.at.get(q, [])]
         numeric += thick
         table = table.without_units_in_cells(numeric).with_decimal(numeric, layout.decimal)

@@ -19,9 +19,10 @@ from paint_deposition.files.recordings.messages import (
     trigger_change,
 )
 from paint_deposition.motion.pose_stream import TriggerChange
-from paint_deposition.motion.transforms import Rigid, is_pose
+from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.bags.recorded_topic import PARAMETER_EVENTS, STATIC_TF
 from paint_deposition.nodes.topics import header_stamp_ns
+from paint_deposition.request import is_pose
 
 # Of each topic of a gun, for the time in which a simulator reads the mesh of the next part.
 REMEMBERED_MESSAGES = 20_000

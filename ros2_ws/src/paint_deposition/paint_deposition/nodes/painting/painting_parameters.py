@@ -14,7 +14,6 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import LoadEffect, read_model
 from paint_deposition.film.common_film import LiveFilms, require_same_film_effects
 from paint_deposition.motion.pose_stream import DEFAULT_POSE_MEMORY
-from paint_deposition.motion.transforms import POSE_FORMAT, is_pose
 from paint_deposition.nodes.managed_node import MANAGED
 from paint_deposition.nodes.parameters import (
     CONFIGURED,
@@ -27,6 +26,7 @@ from paint_deposition.nodes.parameters import (
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import Zones
+from paint_deposition.request import POSE_FORMAT, is_pose
 
 # A part ready to be painted: its refined surface, points on it, unpainted film, and zones.
 PreparedPart = tuple[Surface, SurfacePoints, LiveFilms, Zones | None]
