@@ -156,8 +156,9 @@ def zones_of(folder, *zones, mesh='part.stl'):
 @pytest.mark.parametrize(
     ('place', 'mesh'),
     [
-        ('body: Floor', 'part.obj'), ('mesh: part.obj, body: Floor', 'part.stl'),
+        ('faces: [2-3]', 'part.stl'), ('faces: [2, 3]', 'part.stl'), ('body: Floor', 'part.obj'),
         ('mesh: floor.stl', 'part.stl'), ('mesh: wound_on.stl', 'part.stl'),
+        ('mesh: part.obj, body: Floor', 'part.stl'), ('body: Floor, faces: [0-1]', 'part.obj'),
         ('box: [[-1, -1, -1], [1, 1, 1]], body: Floor', 'part.obj'),
     ],
 )  # fmt: skip
@@ -173,7 +174,7 @@ def test_the_first_zone_that_holds_a_point_has_it_and_others_none(bracket):
     surface = pd.read_mesh(bracket / 'part.stl', 1e-3)
     found = zones_of(
         bracket, f'name: left, {BAND}, box: [[-1, -1, 0], [0.2, 1, 1]]',
-        'name: wall, target_um: 50, tolerance_um: 9, mesh: part.obj, body: Wall',
+        'name: wall, target_um: 50, tolerance_um: 9, faces: [0-1]',
     ).on(surface)  # fmt: skip
     x, wall = surface.vertices_m[:, 0], np.abs(surface.normals[:, 2]) < 0.5
     np.testing.assert_array_equal(found.names[wall], np.where(x[wall] <= 0.2, 'left', 'wall'))
@@ -188,20 +189,24 @@ def test_the_first_zone_that_holds_a_point_has_it_and_others_none(bracket):
     ('zones', 'message'),
     [
         (('name: a, target_um: 30',), "zone 1 has no 'tolerance_um'"),
-        ((f'name: null, {BAND}, mesh: part.stl',), 'name is None; expected what to call it'),
-        ((f'name: 12.10, {BAND}, mesh: part.stl',), 'name: 12.1 is no text; put it in quotes'),
-        ((f'name: a, {BAND}',), 'no place; give box, body or mesh'),
-        (('name: a, target_um: 5, tolerance_um: 5, mesh: part.stl',), 'give a smaller one'),
+        ((f'name: null, {BAND}, faces: [0]',), 'name is None; expected what to call it'),
+        ((f'name: 12.10, {BAND}, faces: [0]',), 'name: 12.1 is no text; put it in quotes'),
+        ((f'name: a, {BAND}',), 'no place; give box, body, faces or mesh'),
+        (('name: a, target_um: 5, tolerance_um: 5, faces: [0]',), 'give a smaller one'),
+        ((f'name: a, {BAND}, faces: [0-x]',), "'0-x' is no number and no range"),
+        ((f'name: a, {BAND}, faces: [3-1]',), 'swap the two'),
+        ((f'name: a, {BAND}, faces: [0-4]',), 'no triangle 4, its last is 3'),
+        ((f'name: a, {BAND}, mesh: part.obj, faces: [0]',), 'several bodies.*name one with body'),
         ((f'name: a, {BAND}, body: Flour',), "zone 'a'.*no body 'Flour'"),
         ((f'name: a, {BAND}, box: [[1, 0, 0], [0, 1, 1]]',), 'lowest corner first'),
-        ((f'name: a, {BAND}, mesh_scale: 1, body: part',), 'mesh_scale has no mesh'),
-        ((f'name: a, {BAND}, mesh: part.stl',) * 2, "two zones are called 'a'"),
+        ((f'name: a, {BAND}, mesh_scale: 1, faces: [0]',), 'mesh_scale has no mesh'),
+        ((f'name: a, {BAND}, faces: [0]',) * 2, "two zones are called 'a'"),
         (
             (f'name: a, {BAND}, box: [[5, 5, 5], [6, 6, 6]]',),
             "zone 'a' holds no vertex of the part.* x 5.000 to 6.000, .* m, the part within",
         ),
         (
-            (f'name: a, {BAND}, mesh: part.stl', f'name: b, {BAND}, mesh: floor.stl'),
+            (f'name: a, {BAND}, mesh: part.stl', f'name: b, {BAND}, faces: [0]'),
             r'belong to zones before it \(a\); put it before them',
         ),
     ],

@@ -35,6 +35,7 @@ CASES: dict[str, tuple[str, ...]] = {
     'German statistics': ('german.csv',),
     'Japanese': ('japanese.csv', '21.5 21.7 22.5 22.3', 'P1 P1 P2 P2'),
     'two rows of headings': ('merged.xlsx', '21.5 22.5', 'P1 P2'),
+    'repeats in a cell': ('repeats.csv', '21.5 22.1 21 22.5', 'P1 P1 P1 P2'),
 }
 
 

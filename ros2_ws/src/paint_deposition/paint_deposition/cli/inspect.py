@@ -150,7 +150,7 @@ def _mesh_contents(path: Path, part: options.Part) -> Contents:
 
     from paint_deposition.files.meshes import LARGEST_M, WITH_UNIT, read_bodies
 
-    ((vertices, faces), _), scale = read_bodies(path, part.body), part.mesh_scale
+    ((vertices, faces), *_), scale = read_bodies(path, part.body), part.mesh_scale
     unit = '' if scale == 1.0 else f'read with --mesh-scale {scale:g}'
     if not unit and path.suffix.lower() not in WITH_UNIT:
         unit = 'it has no unit and is taken for metres'

@@ -271,7 +271,7 @@ class Part:
         """Its regions with targets of their own, if there are any."""
         if self.zones_file is None:
             return None
-        return pd.read_zones(self.zones_file, self.mesh or '', self.mesh_scale)
+        return pd.read_zones(self.zones_file, self.mesh or '', self.mesh_scale, self.body)
 
 
 def part_options(

@@ -223,7 +223,7 @@ def _read_experiments(
             target=band if band[0] else None,
         )  # fmt: skip
         if zones and layer == TOTAL:  # what is wanted is the whole film
-            of_part = read_zones(zones, files['mesh'], entry.mesh_scale)
+            of_part = read_zones(zones, files['mesh'], entry.mesh_scale, entry.body)
             its_files = experiment.files | {'zones': str(zones)}
             experiment = replace(experiment, zones=of_part.on(surface), files=its_files)
         made.append(experiment)

@@ -62,16 +62,18 @@ def read_mesh(
     if down is not None and not (np.isfinite(down).all() and np.any(down)):
         given = np.asarray(down, dtype=float).tolist()
         raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
-    vertices_m, faces, notes = read_triangles(path, scale, body)
+    vertices_m, faces, _, notes = read_triangles(path, scale, body)
     return Surface.from_triangles(vertices_m, faces, max_edge_length_m, down, tuple(notes))
 
 
 def read_triangles(
     path: str | Path, scale: float = 1.0, body: str | None = None
-) -> tuple[np.ndarray, np.ndarray, list[str]]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, list[str]]:
     """Read the triangles of a part, all of one winding where they join; see ``read_mesh``.
 
-    They are vertices (V, 3) [m], faces (F, 3), and what was put right, for the user.
+    They are vertices (V, 3) [m], faces (F, 3), the number (F,) of each in the file or in the body
+    taken of it, from 0, and what was put right, for the user. Triangles of several bodies have no
+    numbers: the readers do not keep the order of bodies.
     """
     path = Path(path)
     meaning = 'metres per unit of the file, 0.001 for millimetres'
@@ -83,7 +85,7 @@ def read_triangles(
         )
     if not path.exists() or path.is_dir():
         raise MeshError(f'{path}: no such mesh file; check the path')
-    (vertices, faces), notes = read_bodies(path, body)
+    (vertices, faces), notes, count = read_bodies(path, body)
     if not len(faces):
         raise MeshError(f'{path}: holds no triangles; export the surface as a triangle mesh')
     if faces.min() < 0 or faces.max() >= len(vertices):
@@ -113,13 +115,13 @@ def read_triangles(
     vertices, faces = weld(vertices, faces)
     # Triangles lower than this have no direction that could be trusted.
     heights_wanted = 1e-7 * edge_lengths_m(vertices, faces).max(axis=1)
-    kept = 2.0 * face_areas_m2(vertices, faces) > heights_wanted
-    if not kept.any():
+    rows = np.flatnonzero(2.0 * face_areas_m2(vertices, faces) > heights_wanted)
+    if not len(rows):
         raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')
-    if not kept.all():
-        notes.append(f'{np.sum(~kept)} of {len(faces)} triangles without area were left out')
-        faces = faces[kept]
-    return vertices, _oriented(vertices, faces, notes), notes
+    if left_out := len(faces) - len(rows):
+        notes.append(f'{left_out} of {len(faces)} triangles without area were left out')
+    faces = faces[rows] if len(rows) < len(faces) else faces
+    return vertices, _oriented(vertices, faces, notes), rows if count == 1 else None, notes
 
 
 def _require_above_zero(name: str, value: float, meaning: str) -> None:
@@ -154,11 +156,11 @@ def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np
     return np.ascontiguousarray(faces)
 
 
-def read_bodies(path: Path, body: str | None = None) -> tuple[Body, list[str]]:
+def read_bodies(path: Path, body: str | None = None) -> tuple[Body, list[str], int]:
     """All bodies of a file as one mesh, or the one of a name (object, solid, node or part).
 
-    With what was understood, for the user. Raises MeshError, saying what to do, for what is no
-    mesh or has no such body.
+    With what was understood, for the user, and how many bodies it is of. Raises MeshError, saying
+    what to do, for what is no mesh or has no such body.
     """
     require_file(path, MeshError)
     kind = path.suffix.lower()
@@ -171,7 +173,7 @@ def read_bodies(path: Path, body: str | None = None) -> tuple[Body, list[str]]:
             if body not in (None, path.stem):
                 raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, [path.stem])}')
             corners = np.fromfile(path, STL_TRIANGLE, offset=STL_HEAD)['corners']
-            return (corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3)), []
+            return (corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3)), [], 1
     scene = _scene(path, kind)
     found = _by_name(path, scene)
     if len(found) == 1 and not {*found} & {body}:  # the only one also has the name of its file
@@ -198,7 +200,7 @@ def read_bodies(path: Path, body: str | None = None) -> tuple[Body, list[str]]:
     first = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
     faces = [faces + start for (_, faces), start in zip(bodies, first, strict=False)]
     whole = np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
-    return whole, notes
+    return whole, notes, len(bodies)
 
 
 def _scene(path: Path, kind: str) -> Scene:

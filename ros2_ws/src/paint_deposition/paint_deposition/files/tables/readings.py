@@ -86,7 +86,10 @@ class ReadingTable(Table):
         thick = table.at['thickness'] if films else []
         table.layers = layers_of(table.headings, layout, thick)
         refuse_misleading(table, table.at, layout, table.layers, bare)
-        # The cells: the unit of their readings in the heading, and n/a for what is none.
+        # The cells: one reading in each, its unit in the heading, and n/a for what is none.
+        if films and not table.layers:
+            table, thick = table.with_repeats_apart(thick)
+            table.at['thickness'] = thick
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in table.at.get(q, [])]
         numeric += thick
         table = table.without_units_in_cells(numeric).with_decimal(numeric, layout.decimal)

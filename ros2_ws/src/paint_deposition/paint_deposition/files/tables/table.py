@@ -12,7 +12,7 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.tables.headings import MOST_LINES_ABOVE, UNITS, Heading, unit_of
 from paint_deposition.files.tables.sheets import Cell, cell_at, is_nothing, is_value, text_of
 
-MOST_ERRORS_SHOWN = 8
+MOST_ERRORS_SHOWN, MOST_REPEATS = 8, 50
 NUMBER_AND_MORE = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
 NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
 Kind = TypeVar('Kind', bound='Table')
@@ -132,6 +132,31 @@ class Table:
             for n, row in enumerate(self.rows)
         ]
         return replace(self, rows=rows)
+
+    def with_repeats_apart(self: Kind, columns: Sequence[int]) -> tuple[Kind, list[int]]:
+        """The table with a column for each of several numbers in one cell, as in '21.5; 22.1'.
+
+        Then the columns of all these numbers.
+        """
+        headings, found, width = [*self.headings], [*columns], len(self.headings)
+        repeats = any(';' in text for k in columns for text in self.texts(k))
+        if not repeats or max(map(len, self.rows)) > width:
+            return self, found
+        rows = [[*row, *[''] * (width - len(row))] for row in self.rows]
+        for k in columns:
+            cells = [[part.strip() for part in text.split(';')] for text in self.texts(k)]
+            most = max(map(len, cells))
+            if not 1 < most <= MOST_REPEATS:
+                continue
+            found += range(len(headings), len(headings) + most - 1)
+            headings += [
+                replace(headings[k], text=f'{headings[k].text} ({number})')
+                for number in range(2, most + 1)
+            ]
+            for row, parts in zip(rows, cells, strict=True):
+                row[k] = parts[0]
+                row += [*parts[1:], *[''] * (most - len(parts))]
+        return replace(self, headings=headings, rows=rows), found
 
     def without_units_in_cells(self: Kind, columns: Iterable[int]) -> Kind:
         """The table with the unit behind the numbers of a column in its heading instead.
