@@ -18,6 +18,7 @@ from paint_deposition.files.tables.gauge_formats import (
     FOLDERS,
     FORMATS,
     LAYERS,
+    LINES,
     OWN,
 )
 from paint_deposition.files.zones_file import ZoneEntry
@@ -39,7 +40,7 @@ A model has `planar` or `brushes` by their numbers, `projection`, a list of
 def text() -> str:
     """A section for each file."""
     own = ', '.join(f'`{name}`' for name in OWN.values())
-    layouts = dict.fromkeys([*(one.name for one in FORMATS), *FOLDERS])
+    layouts = dict.fromkeys([*(one.name for one in FORMATS), *LINES, *FOLDERS])
     aliases = [(f'`{name}`', ', '.join(words)) for name, words in ALIASES.items()]
     return '\n'.join([
         '## Model\n',
@@ -61,7 +62,7 @@ def text() -> str:
         '## Gauge readings\n', f'Own columns: {own}. Other headings, without accents:\n',
         table(('column', 'headings'), aliases),
         'Side by side, layers: ' + '; '.join(f'`{n}` {", ".join(w)}' for n, w in LAYERS.items()),
-        f'\nLayouts known by their headings: {"; ".join(layouts)}.\n',
+        f'\nLayouts known by their headings or lines: {"; ".join(layouts)}.\n',
         '## Sweep\n',
         'Also the keys of [a motion](#a-motion) and of [a part](#a-part).\n',
         _keys(SweepFile, without=MOTION.union(PART)),

@@ -11,7 +11,7 @@ import pytest
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.gauge_readings import read_readings, write_predictions
-from paint_deposition.files.tables.gauge_formats import FOLDERS, FORMATS
+from paint_deposition.files.tables.gauge_formats import FOLDERS, FORMATS, LINES
 from paint_deposition.files.tables.reading_columns import Layout
 from workbook import write_workbook
 
@@ -31,6 +31,9 @@ CASES: dict[str, tuple[str, ...]] = {
     'DeFelsko PosiTector, Value': ('positector_value.csv',),
     'DeFelsko PosiTector, Thickness': ('positector_thickness.csv',),
     'PosiTector batch, folder': ('B1',),
+    'PosiTector, serial': ('serial.txt',),
+    'PosiTector, serial with a missing one': ('serial_missing.txt', '21.5 19.5', 'P1 P4'),
+    'Fischer, printed': ('printed.txt',),
     'spots of SSPC-PA 2': ('spots.csv', '21 22 21.5 22.5 22.5', 'P1 P1 P1 P2 P2'),
     'German statistics': ('german.csv',),
     'Japanese': ('japanese.csv', '21.5 21.7 22.5 22.3', 'P1 P1 P2 P2'),
@@ -62,7 +65,7 @@ def test_a_layout_is_read_as_it_is_written(name, tmp_path, points):
 
 
 def test_each_known_layout_has_its_case():
-    layouts = {*(one.name for one in FORMATS), *FOLDERS} - {'coordinate measuring machine'}
+    layouts = {*(one.name for one in FORMATS), *LINES, *FOLDERS} - {'coordinate measuring machine'}
     assert not [name for name in layouts if not any(case.startswith(name) for case in CASES)]
 
 

@@ -229,13 +229,12 @@ def _serialised(value: Any) -> bytes:
     """Bytes that ``pickle.loads`` opens elsewhere; the files of users' effects run there."""
     content = io.BytesIO()
     pickler = pickle.Pickler(content, protocol=5)
-    # How to make the class of a user's effect elsewhere; the name of any other.
-    pickler.dispatch_table = copyreg.dispatch_table | {
-        type(Effect): lambda model: (
-            (effect_of, (model.file, model.file_content))
-            if getattr(model, 'file', None)
-            else model.__qualname__
-        )
-    }
+    pickler.dispatch_table = copyreg.dispatch_table | {type(Effect): _class_reduced}
     pickler.dump(value)
     return content.getvalue()
+
+
+def _class_reduced(model: Any) -> Any:
+    """How to make the class of a user's effect elsewhere; the name of any other."""
+    file = getattr(model, 'file', None)
+    return (effect_of, (file, model.file_content)) if file else model.__qualname__

@@ -78,6 +78,18 @@ FORMATS = (
     GaugeFormat('coordinate measuring machine', ('x', 'y', 'z', 'i', 'j', 'k'),
                 {'nx': 'i', 'ny': 'j', 'nz': 'k'}),
 )  # fmt: skip
+UNIT = r'(?P<unit>mils?|thou|µm|μm|um|microns?|mm)'
+# Lines without headings, as gauges print or send them, dashes for no reading: the groups are the
+# headings.
+LINES = {
+    'PosiTector, serial': re.compile(
+        rf'\x02?\s*(?P<thickness>[\d.,]+(?=[^\d.,]*\s[FN])|-+)\s*{UNIT}?\s*(?P<probe>[FN]\w*)?\s*',
+        re.IGNORECASE,
+    ),
+    'Fischer, printed': re.compile(
+        rf'\s*n\.?\s*=\s*(?P<number>\d+)\s+(?P<thickness>[\d.,]+|-+)\s*{UNIT}\s*', re.IGNORECASE
+    ),
+}
 # The files of a folder that are one table, one below the other.
 FOLDERS = {'PosiTector batch': ('header.txt', 'readings.txt')}
 

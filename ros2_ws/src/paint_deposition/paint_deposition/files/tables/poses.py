@@ -125,11 +125,7 @@ def _motion(table: Table, robot: 'Robot | None', options: MotionOptions) -> Traj
     else:
         positions, its_unit = _positions_m(table, options.pose_unit)
         quaternions, its_rotation = read_rotations(table, options.rotation, options.angle_unit)
-        frame = find(table, 'frame', 'frameid')
-        names = set() if frame is None else {*table.texts(frame)}
-        if len(names) > 1:
-            raise RecordingError(f'poses in frames {", ".join(sorted(names))}; give one frame')
-        poses = Trajectory(stamps, positions, quaternions, ''.join(names).lstrip('/'))
+        poses = Trajectory(stamps, positions, quaternions, _frame(table))
         how = f'{len(table)} poses: x y z in {its_unit}; {its_rotation}'
     note = f'{how}; {by_trigger}{by_brush}'
     if time is None and speed is not None:
@@ -149,6 +145,15 @@ def _motion(table: Table, robot: 'Robot | None', options: MotionOptions) -> Traj
         trigger_flow=flows,
         trigger_brush=brushes,
     )
+
+
+def _frame(table: Table) -> str:
+    """The frame that a column names, '' for none."""
+    column = find(table, 'frame', 'frameid')
+    names = set() if column is None else {*table.texts(column)}
+    if len(names) > 1:
+        raise RecordingError(f'poses in frames {", ".join(sorted(names))}; give one frame')
+    return ''.join(names).lstrip('/')
 
 
 def _moves(

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from paint_deposition.errors import PaintError, some
 from paint_deposition.files.atomic import read_file, require_small_package
-from paint_deposition.files.tables.gauge_formats import FOLDERS, NOTHING
+from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES, NOTHING
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
@@ -136,10 +136,16 @@ def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
     lines = text.splitlines()
     by_blanks = enumerate((list[Cell](line.split()) for line in lines), 1)
     by_lines = enumerate((list[Cell]([_cell(line)]) for line in lines), 1)
-    return [
-        *sheets, Sheet.of(by_blanks, f'blanks, {encoding}'),
-        Sheet.of(by_lines, f'one column, {encoding}'),
-    ]  # fmt: skip
+    whole = Sheet.of(by_lines, f'one column, {encoding}')
+    for name, pattern in LINES.items():
+        rows = [
+            (number, [_cell(part or '') for part in found.groups()])
+            for number, line in enumerate(lines, 1)
+            if (found := pattern.fullmatch(line))
+        ]
+        if 2 * len(rows) > len(whole.rows):
+            sheets.append(Sheet.of([(0, [*pattern.groupindex]), *rows], f'{name}, {encoding}'))
+    return [*sheets, Sheet.of(by_blanks, f'blanks, {encoding}'), whole]
 
 
 def _sheets_of_workbook(content: bytes) -> list[Sheet]:
