@@ -50,7 +50,8 @@ def term_weights(planar: PlanarPattern) -> tuple[np.ndarray, np.ndarray]:
     ]
     film = ring * whole_ring + centre * centred
     # The normalisation gamma is a square of lengths: r d/dr + sigma1 d/dsigma1 doubles it.
-    log_gamma_by_r = p.gamma_by_r_m / p.gamma_m2
+    within_r = math.erf(p.r_m / (math.sqrt(2.0) * p.sigma1_m))
+    log_gamma_by_r = (2.0 * math.pi) ** 1.5 * p.sigma1_m * within_r / p.gamma_m2
     log_gamma_by_sigma = 2.0 - p.r_m * log_gamma_by_r
     by_cos, by_sin = ring * np.eye(kernel.TERMS)[[kernel.BY_COS, kernel.BY_SIN]]
     return film, np.stack([

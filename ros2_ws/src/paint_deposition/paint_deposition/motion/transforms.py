@@ -161,9 +161,8 @@ class FrameTree:
 
     def fix(self, child: str, parent: str, pose: Sequence[float]) -> None:
         """Take a static transform, which replaces earlier ones of the frame."""
-        if self._has_room(child):
-            self._lasting.clear()
-            self._fixed[_name(child)] = _name(parent), Rigid.of(pose)
+        self._lasting.clear()
+        self._fixed[_name(child)] = _name(parent), Rigid.of(pose)
 
     def place(self, child: str, parent: str, pose: Sequence[float]) -> None:
         """Say where a frame is, whatever transforms say of it; no pose: they say it again."""
@@ -178,8 +177,6 @@ class FrameTree:
         Returns:
             Whether a live stream began again: poses over time from before it are forgotten.
         """
-        if not self._has_room(child):
-            return False
         name, newest_ns = _name(child), self.newest_ns(child)
         entry = stamp_ns, _name(parent), np.array(pose, dtype=float)
         is_behind = self._live and _is_far_behind(stamp_ns, newest_ns)
@@ -203,10 +200,6 @@ class FrameTree:
             del motion[: max(old, len(motion) - 100_000)]
         return restarted
 
-    def _has_room(self, child: str) -> bool:
-        known = self._fixed.keys() | self._moving.keys()
-        return _name(child) in known or len(known) < 1000
-
     def placed(self, child: str) -> tuple[str, Rigid] | None:
         """Parent and pose of a frame that does not move, None if it does or is not known."""
         return self._still.get(_name(child))
@@ -220,23 +213,19 @@ class FrameTree:
         """The stamps of the poses of a frame over time."""
         return [stamp for stamp, *_ in self._moving[_name(child)]]
 
-    def _ancestors(self, frame: str, stamp_ns: int) -> list[str]:
-        """A frame, its parent at that time and so on up to the root."""
-        chain, still = [_name(frame)], self._still
-        while len(chain) <= len(still) + len(self._moving):
-            if chain[-1] in still:
-                chain.append(still[chain[-1]][0])
-            elif chain[-1] in self._moving:
-                motion = self._moving[chain[-1]]
-                at_or_before = bisect_right(motion, stamp_ns, key=STAMP) - 1
-                chain.append(motion[max(at_or_before, 0)][1])
-            else:
-                break
-        return chain
-
     def _up(self, one: str, other: str, stamp_ns: int) -> tuple[list[str], list[str]]:
         """The frames from either up to, and without, the first that both are in."""
-        chains = self._ancestors(one, stamp_ns), self._ancestors(other, stamp_ns)
+        chains, still = ([_name(one)], [_name(other)]), self._still
+        for chain in chains:
+            while len(chain) <= len(still) + len(self._moving):
+                if chain[-1] in still:
+                    chain.append(still[chain[-1]][0])
+                elif chain[-1] in self._moving:
+                    motion = self._moving[chain[-1]]
+                    at_or_before = bisect_right(motion, stamp_ns, key=STAMP) - 1
+                    chain.append(motion[max(at_or_before, 0)][1])
+                else:
+                    break
         shared = next((frame for frame in chains[0] if frame in chains[1]), None)
         if shared is None:
             raise NoTransform(f"no transforms connect '{one}' to '{other}'", may_come=True)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.fast_math import cross, difference, dot, length
@@ -145,24 +144,6 @@ class CurvedEdges:
     curved_normals: np.ndarray
     lengths_m: np.ndarray  # (E,) of the edges as they were read [m]
     turns_rad: np.ndarray  # (E,) by which the normals turn along the edge [rad]
-
-    def off_at(self, positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far the curve is from the mesh at points on it, and by how much the normals turn.
-
-        What an edge's middle has fades toward its ends: at corners both are right. (P, 3) each, to
-        be added to positions [m] and normals.
-        """
-        if not len(self.middles_m):
-            return np.zeros_like(positions_m), np.zeros_like(positions_m)
-        # A point within a triangle lies near the middles of its sides, and of few others.
-        near = min(8, len(self.middles_m))
-        away_m, edge = scipy.spatial.cKDTree(self.middles_m).query(positions_m, range(1, near + 1))
-        fading = np.clip(1.0 - (2.0 * away_m / self.lengths_m[edge]) ** 2, 0.0, None) ** 2
-        off_m, turns = self.curved_m - self.middles_m, self.curved_normals - self.normals
-        return (
-            np.einsum('pk,pkx->px', fading, off_m[edge]),
-            np.einsum('pk,pkx->px', fading, turns[edge]),
-        )
 
     @staticmethod
     def of(

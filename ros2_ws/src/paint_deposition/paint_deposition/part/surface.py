@@ -7,6 +7,8 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
 
 from paint_deposition.kernel.blocks import (
     box_centre_m,
@@ -32,7 +34,7 @@ from paint_deposition.part.points import (
     outward_side,
 )
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, face_normals, refine
-from paint_deposition.part.visibility import Obstacle, obstacle_of, sky_view_factor
+from paint_deposition.part.visibility import Obstacle, sky_view_factor
 
 
 @dataclass(frozen=True)
@@ -154,8 +156,10 @@ class Surface:
 
     @cached_property
     def obstacle(self) -> Obstacle:
-        """The part as an obstacle to rays."""
-        return obstacle_of(self.tree)
+        """The part as an obstacle to rays; Embree takes a second for a million triangles."""
+        # It works in single precision: coordinates are kept small.
+        scene, corners = EmbreeScene(robust=True), (self.vertices_m - self.centre_m).astype('f4')
+        return scene, self.centre_m, TriangleMesh(scene, corners, self.tree.faces.astype('i4'))
 
     def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(N,) the triangle that each ray meets first, from either side, -1 for none."""
