@@ -22,8 +22,8 @@ def model_constants(model: DepositionModel) -> np.ndarray:
         # Stands for a gain of nothing, which has no logarithm [um/s].
         c[kernel.RING], c[kernel.CENTRE] = np.log2(np.maximum([ring, centre], 1e-30))
         c[kernel.RADIUS] = planar.r_m
-        c[kernel.NARROW1] = 0.5 * np.log2(np.e) / planar.sigma1_m**2
-        c[kernel.NARROW2] = 0.5 * np.log2(np.e) / planar.sigma2_m**2
+        c[kernel.NARROW1] = 0.5 * math.log2(math.e) / planar.sigma1_m**2
+        c[kernel.NARROW2] = 0.5 * math.log2(math.e) / planar.sigma2_m**2
         c[kernel.COS] = planar.K3 * np.cos(planar.phi_rad)
         c[kernel.SIN] = planar.K3 * np.sin(planar.phi_rad)
         c[kernel.NEAREST] = model.projection.nearest_m
