@@ -110,13 +110,13 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> tu
 
     The part is turned to the gun; of the model, pattern and projection count, effects do not.
     """
-    edges, count = surface.curved_edges, len(surface.curved_edges.middles_m)
+    edges, count = surface.curved_edges, len(surface.curved_edges)
     if not count:
         return 0.0, ''
     some = slice(None, None, 1 + len(surface.vertices_m) // VERTICES)
     points = SurfacePoints(
-        np.concatenate([edges.middles_m, edges.curved_m, surface.vertices_m[some]]),
-        np.concatenate([edges.normals, edges.curved_normals, surface.normals[some]]),
+        np.concatenate([edges['middle_m'], edges['curved_m'], surface.vertices_m[some]]),
+        np.concatenate([edges['normal'], edges['curved_normal'], surface.normals[some]]),
     )
     painted = FilmIntegrator(points, model.model_copy(update={'effects': ()}))
     film_um = painted.raw_of(path.select(slice(None, None, 1 + len(path) // SUB_STEPS)))
@@ -124,15 +124,15 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> tu
     if peak_um == 0.0:
         return 0.0, ''
     error_um = np.abs(film_um[count : 2 * count] - film_um[:count])
-    worst = int(error_um.argmax())
-    share, edge_m = float(error_um[worst] / peak_um), float(edges.lengths_m[worst])
+    share, worst = float(error_um.max() / peak_um), edges[error_um.argmax()]
     if share <= WANTED:
         return share, ''
-    place = ', '.join(f'{value:.3f}' for value in edges.middles_m[worst])
+    edge_m, turn_deg = float(worst['length_m']), np.degrees(worst['turn_rad'])
+    place = ', '.join(f'{value:.3f}' for value in worst['middle_m'])
     return share, (
         f'the mesh is coarser than its curvature allows: the film is off by up to '
         f'{100 * share:.1f} % of its peak near ({place}) m, where an edge of '
-        f'{1e3 * edge_m:.0f} mm turns by {np.degrees(edges.turns_rad[worst]):.0f} degrees; export '
+        f'{1e3 * edge_m:.0f} mm turns by {turn_deg:.0f} degrees; export '
         f'it finer, with edges of about {1e3 * SAFETY * edge_m * WANTED / share:.1g} mm there'
     )
 
@@ -142,16 +142,16 @@ def facet_errors_um(
 ) -> np.ndarray:
     """(P,) film on the curve that a mesh stands for less that on its facets, at points [um]."""
     edges, positions_m = surface.curved_edges, points.positions_m
-    if not len(edges.middles_m):
+    if not len(edges):
         return np.zeros(len(points))
     # A point within a triangle lies near the middles of its sides, and of few others. What an
     # edge's middle has fades toward its ends: at corners the mesh is right.
-    near = range(1, 1 + min(8, len(edges.middles_m)))
-    away_m, edge = cKDTree(edges.middles_m).query(positions_m, near)
-    fading = np.clip(1.0 - (2.0 * away_m / edges.lengths_m[edge]) ** 2, 0.0, None) ** 2
+    near = range(1, 1 + min(8, len(edges)))
+    away_m, edge = cKDTree(edges['middle_m']).query(positions_m, near)
+    fading = np.clip(1.0 - (2.0 * away_m / edges['length_m'][edge]) ** 2, 0.0, None) ** 2
     if not fading.any():
         return np.zeros(len(points))
-    off_m, turns = edges.curved_m - edges.middles_m, edges.curved_normals - edges.normals
+    off_m, turns = edges['curved_m'] - edges['middle_m'], edges['curved_normal'] - edges['normal']
     normals = points.normals + np.einsum('pk,pkx->px', fading, turns[edge])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     both = SurfacePoints(

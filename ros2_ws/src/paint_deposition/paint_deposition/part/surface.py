@@ -16,7 +16,7 @@ from paint_deposition.kernel.blocks import (
     shared_among_threads,
 )
 from paint_deposition.part import creases, derivatives
-from paint_deposition.part.creases import NO_EDGES, CurvedEdges
+from paint_deposition.part.creases import CURVED_EDGE
 from paint_deposition.part.edges import (
     edge_distance_m,
     half_edges_m,
@@ -53,7 +53,7 @@ class Surface:
         gun_side: (3,) mean direction from the part to the gun, or None; it shows the painted
             side of a part whose surface has several, a closed body.
         in_hem: (V,) bool, vertices on the narrow strips of a hem or rim; None: there are none.
-        curved_edges: where the mesh as it was read is coarser than its curvature.
+        curved_edges: (E,) CURVED_EDGE, where the mesh as read is coarser than its curvature.
         neighbours: (V,) vertices in the order in which they are painted, see
             ``kernel.blocks.neighbours_together``; None: they are sorted when they are.
     """
@@ -67,7 +67,7 @@ class Surface:
     notes: tuple[str, ...] = ()
     gun_side: np.ndarray | None = None
     in_hem: np.ndarray | None = None
-    curved_edges: CurvedEdges = NO_EDGES
+    curved_edges: np.ndarray = field(default_factory=lambda: np.empty(0, CURVED_EDGE))
     neighbours: np.ndarray | None = None
 
     def __repr__(self) -> str:
@@ -113,7 +113,7 @@ class Surface:
         unjoined = paired[~smooth, 1], clashing.ravel(), single
         hem = paired[rim].ravel()
         half_edges = np.concatenate([paired[:, 0], *unjoined])
-        curved_edges = CurvedEdges.of(corners, read_normals, patches, half_edges)
+        curved_edges = creases.curved_edges(corners, read_normals, patches, half_edges)
         del paired, folds, half_edges, unjoined  # large ones, before the next are made
         vertices, normals, fine = refine(corners, read_normals, patches, max_edge_length_m)
         areas = np.repeat(face_areas_m2(vertices, fine) / 3.0, 3)
@@ -299,12 +299,14 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
 
 def turned(surface: Surface) -> Surface:
     """The part with its other side outward."""
-    edges = surface.curved_edges
+    edges = surface.curved_edges.copy()
+    for name in ('normal', 'curved_normal'):
+        edges[name] *= -1.0
     return replace(
         surface,
         faces=np.ascontiguousarray(surface.faces[:, ::-1]),
         normals=-surface.normals,
-        curved_edges=replace(edges, normals=-edges.normals, curved_normals=-edges.curved_normals),
+        curved_edges=edges,
     )
 
 
