@@ -11,6 +11,7 @@ import scenes
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
 from paint_deposition.effects.learned_curves import CURVES
+from paint_deposition.effects.learned_laws import LearnedFootprint
 from paint_deposition.files.effect_file import problem_in_words, read_effect_file
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.kernel.eq2_flux import Ray, in_precision
@@ -26,7 +27,7 @@ UNIT_SUFFIXES = {
     '1/(m/s)': '_per_m_per_s', 'm/m': '_m_per_m', '1': '',
 }  # fmt: skip
 # What has a kernel of its own takes seconds to compile.
-COMPILED = [*WITH_LAW, EFFECTS['occlusion']]
+COMPILED = [*WITH_LAW, LearnedFootprint, EFFECTS['occlusion']]
 
 
 def case(effect: type[Effect], *more: str):
@@ -113,7 +114,7 @@ def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str
     assert np.linalg.norm(forward - other) <= 0.02 * scale + 1e-8
 
 
-@pytest.mark.parametrize('effect', [case(effect) for effect in WITH_LAW])
+@pytest.mark.parametrize('effect', [case(effect) for effect in (*WITH_LAW, LearnedFootprint)])
 def test_the_kernel_computes_the_law(effect: type[Effect]):
     points = booth.door().points().select(slice(None, None, 7))
     path = booth.path_of(booth.serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))

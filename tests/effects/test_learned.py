@@ -274,20 +274,3 @@ def test_at_its_radii_it_has_the_mean_and_the_harmonics_that_were_given():
     for x_m in (0.0, 1e-12):
         found = FOOTPRINT.flux_factor(at(x_m, 0.0), *FOOTPRINT.values())
         assert found == pytest.approx(1.0 + RINGS[0, 0])
-
-
-def of_the_pattern(h) -> float:
-    """Integral over the model plane of the pattern times a function of the place."""
-    line = np.linspace(-0.6, 0.6, 801)
-    x, y = np.meshgrid(line, line)
-    return float((MODEL.planar.flux_um_per_s(x, y) * h(x, y)).sum())
-
-
-@pytest.mark.slow
-def test_the_paint_on_a_flat_panel_changes_as_the_integral_of_the_pattern():
-    """All that passes the model plane lands on the panel, wherever it passes."""
-    with_it = of_the_pattern(lambda x, y: 1.0 + FOOTPRINT.h(x, y))
-    expected = with_it / of_the_pattern(lambda x, y: 1.0)
-    assert abs(expected - 1.0) > 0.01
-    film, plain = (painted(panel(0.5, 0.01), spot(), *e).raw_um for e in ((FOOTPRINT,), ()))
-    assert film.sum() / plain.sum() == pytest.approx(expected, abs=3e-4)

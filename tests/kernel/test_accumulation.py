@@ -9,11 +9,12 @@ from paint_deposition.film.integrator import FEW_RAYS
 from paint_deposition.kernel import blocks
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
+from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 from patterns import PATTERNS
 from reference import reference_film_um
-from scenes import lying_plane, painted, straight_pass, weaving
+from scenes import LOOKING_DOWN, lying_plane, painted, straight_pass, weaving
 
 PROJECTIONS = {
     'default': Projection(),
@@ -58,6 +59,32 @@ def test_it_computes_eqs_1_and_2(planar, projection, precision):
     assert np.count_nonzero(expected) > 100
     error = np.abs(painted(points, path, model, precision).raw_um - expected)
     assert error.max() <= TOLERANCE[precision] * expected.max()
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_the_film_of_random_guns_is_right_to_its_last_digits(seed):
+    """So few points that none is out of reach: what double must keep, and what single promises."""
+    rng, poses = np.random.default_rng(seed), 25
+    planar = PlanarPattern(
+        K1_cm3_per_s=rng.uniform(0.5, 4.0), K2=rng.uniform(0, 1), K3=rng.uniform(0, 1),
+        phi_rad=rng.uniform(-3, 3), r_m=rng.uniform(0.02, 0.25),
+        sigma1_m=rng.uniform(0.02, 0.1), sigma2_m=rng.uniform(0.02, 0.15),
+    )  # fmt: skip
+    plane_m, offset_m = rng.uniform(0.15, 0.5), rng.uniform(0.0, 0.1)
+    projection = Projection(model_plane_m=plane_m, emission_offset_m=offset_m)
+    model = DepositionModel(planar=planar, projection=projection)
+    tilt = Rotation.from_rotvec(rng.normal(scale=0.5, size=(poses, 3)))
+    path = SprayPath.of(
+        np.arange(poses), rng.uniform(0.001, 0.02, poses), rng.uniform(0.5, 1.5, poses),
+        rng.uniform([-0.4, -0.4, 0.15], [0.4, 0.4, 0.4], size=(poses, 3)),
+        (Rotation.from_quat(LOOKING_DOWN) * tilt).as_matrix(), np.zeros((poses, 3)),
+    )  # fmt: skip
+    points = rough_surface(seed, 40)
+    expected = reference_film_um(points, path, model)
+    assert expected.max() > 0.01
+    for precision, tolerance in (('double', 2e-12), ('single', 1e-6)):
+        error = np.abs(painted(points, path, model, precision).raw_um - expected)
+        assert error.max() < tolerance * expected.max()
 
 
 def test_the_pattern_shift_moves_the_pattern_over_the_model_plane():

@@ -98,18 +98,14 @@ def sphere(radius_m, standoff_m):
     return radius_m * (normals - [0.0, 0.0, 1.0]), normals, weight * radius_m**2 * np.sin(t)
 
 
-@pytest.mark.parametrize('standoff_m', STANDOFFS_M)
-@pytest.mark.parametrize('tilt_deg', [0, 15, -30, 45])
-def test_a_plane_however_tilted_takes_all(standoff_m, tilt_deg):
-    positions, normals, area = plane(math.radians(tilt_deg))
-    got = flux(positions, normals, [0, 0, standoff_m], planar=NARROW)
-    assert area @ got == pytest.approx(NARROW.K1_cm3_per_s, rel=2e-5)
+WIDE = {f'{deg} deg': plane(math.radians(deg)) for deg in (0, 15, -30, 45)}
+WIDE |= {'bulging': cylinder(1.0), 'hollow': cylinder(-1.0)}
 
 
 @pytest.mark.parametrize('standoff_m', STANDOFFS_M)
-@pytest.mark.parametrize('radius_m', [1.0, -1.0])
-def test_a_cylinder_wider_than_the_spray_takes_all(standoff_m, radius_m):
-    positions, normals, area = cylinder(radius_m)
+@pytest.mark.parametrize('surface', WIDE)
+def test_a_plane_however_tilted_and_a_cylinder_wider_than_the_spray_take_all(standoff_m, surface):
+    positions, normals, area = WIDE[surface]
     got = flux(positions, normals, [0, 0, standoff_m], planar=NARROW)
     assert area @ got == pytest.approx(NARROW.K1_cm3_per_s, rel=2e-5)
 
@@ -143,12 +139,9 @@ def test_no_negative_or_infinite_flux_from_anywhere(position, seed, offset, K3):
     assert got[0] >= 0.0
 
 
-def test_surface_that_looks_away_gets_none():
+def test_what_looks_away_and_what_lies_behind_the_bell_gets_none():
     away = [[0, 0, -1], [0.6, 0, -0.8], [1, 0, -1e-9]]
     assert flux(np.zeros((3, 3)), away, [0, 0, 0.25]).tolist() == [0, 0, 0]
-
-
-def test_what_lies_behind_the_bell_gets_none():
     behind = [[0.02, 0.0, 0.251], [0.0, 0.0, 0.28], [0.3, 0.0, 0.6]]
     assert flux(behind, np.tile([0, 0, 1], (3, 1)), [0, 0, 0.25]).tolist() == [0, 0, 0]
     assert flux(behind, np.tile([0, 0, -1], (3, 1)), [0, 0, 0.25]).tolist() == [0, 0, 0]

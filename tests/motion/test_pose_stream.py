@@ -92,13 +92,6 @@ def _poses(first, count) -> PoseBatch:
     return PoseBatch(stamps, of_each + np.arange(3) / 3, -of_each - np.arange(4) / 5)
 
 
-def _log(*events: TriggerChange | PoseBatch, **limits: int) -> MotionLog:
-    log = MotionLog(**limits)
-    for event in events:
-        log.add(event)
-    return log
-
-
 def _in_words(events) -> list:
     """Poses by their stamps, wherever their batches end, and the changes between them."""
     told = []
@@ -109,8 +102,9 @@ def _in_words(events) -> list:
 
 @pytest.mark.parametrize('sizes', [(9000,), (13,) * 692 + (4,), (4096, 1, 4095, 808)])
 def test_poses_of_any_batches_come_back_to_the_last_bit(sizes):
-    firsts = np.cumsum([0, *sizes])
-    log = _log(*(_poses(first, size) for first, size in zip(firsts, sizes, strict=False)))
+    log = MotionLog()
+    for first, size in zip(np.cumsum([0, *sizes]), sizes, strict=False):
+        log.add(_poses(first, size))
     batches = list(log.events())
     assert max(map(len, batches)) <= 256
     for name, column in vars(_poses(0, 9000)).items():
@@ -119,7 +113,9 @@ def test_poses_of_any_batches_come_back_to_the_last_bit(sizes):
 
 def test_who_has_followed_a_part_gets_the_rest():
     events = [_poses(0, 5), TriggerChange(5, 1.0), _poses(5, 5000), TriggerChange(9000, 0.0)]
-    log, follower = _log(*events), MotionLog()
+    log, follower = MotionLog(), MotionLog()
+    for event in events:
+        log.add(event)
     for event in log.events():
         rest = _in_words(log.events(follower.poses, follower.changes))
         assert rest == _in_words(log.events())[follower.poses + follower.changes :]

@@ -8,7 +8,6 @@ from itertools import compress
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import box_words
 from paint_deposition.part.refinement import face_normals
@@ -68,9 +67,20 @@ class GunView:
     def landing(self) -> np.ndarray:
         """(N,) share of each pose's straight rays that meet the outward side of the part."""
         projection = self.model.projection
-        brush = self.model.pattern_rows(self.path.brush)
-        rays = np.array([pattern_rays(planar) for planar in self.model.patterns])[brush]
-        x, y, weights = np.moveaxis(rays, 1, 0)
+        # Places on the model plane that share out eq. (1), with their weights. Radii hold equal
+        # shares of the volume between them; azimuths follow the golden angle, so that no edge of
+        # a part lines up with many rays at once.
+        azimuth, rays = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(RAYS), []
+        for planar in self.model.patterns:
+            radii = np.linspace(0.0, planar.radius_of_flux_m(1e-4), 500)
+            shares = (np.arange(RAYS) + 0.5) / RAYS
+            radius = np.interp(shares, planar.enclosed_fraction(radii), radii)
+            x, y = radius * np.cos(azimuth), radius * np.sin(azimuth)
+            even = planar.model_copy(update={'K3': 0.0})
+            weights = planar.flux_um_per_s(x, y) / even.flux_um_per_s(x, y)
+            rays.append((x, y, weights / weights.sum()))
+        of_brush = np.array(rays)[self.model.pattern_rows(self.path.brush)]
+        x, y, weights = np.moveaxis(of_brush, 1, 0)
         local = np.stack([x, y, np.full(x.shape, projection.model_plane_m)], axis=2)
         ways = np.einsum('nij,nrj->nri', self.path.rotation, local)
         back = projection.emission_offset_m * self.path.rotation[:, :, 2]
@@ -91,22 +101,6 @@ class GunView:
         return [one for one in each if one.dwell_s @ one.speed_m_per_s >= 0.05]
 
 
-def pattern_rays(planar: PlanarPattern) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(R,) places x, y on the model plane [m] that share out eq. (1), and their weights.
-
-    Radii hold equal shares of the volume between them; azimuths follow the golden angle, so that
-    no edge of a part lines up with many rays at once.
-    """
-    radii = np.linspace(0.0, planar.radius_of_flux_m(1e-4), 500)
-    shares = (np.arange(RAYS) + 0.5) / RAYS
-    radius = np.interp(shares, planar.enclosed_fraction(radii), radii)
-    azimuth = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(RAYS)
-    x, y = radius * np.cos(azimuth), radius * np.sin(azimuth)
-    even = planar.model_copy(update={'K3': 0.0})
-    weights = planar.flux_um_per_s(x, y) / even.flux_um_per_s(x, y)
-    return x, y, weights / weights.sum()
-
-
 def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
     """Yield what is odd, a line each with its likely cause; what follows from one is left out."""
     sprayed_m = view.whole.position_m[view.whole.flow > 0.0]
@@ -114,11 +108,11 @@ def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
         f"the poses in frame '{frame_id}' span {box_words(sprayed_m)}, the mesh "
         f'{box_words(view.surface.vertices_m)}'
     )
-    alone = _other_unit(view) or _not_over(view, boxes)
+    alone = _elsewhere(view, boxes)
     if alone:
         yield alone
         return
-    aim = _wrong_axis(view, boxes) or _off_model_plane(view, boxes)
+    aim = _misaimed(view, boxes)
     # Whether so much of each pass lands on the part; of one that is too short it is not known.
     passes = [view.path.spray_pass == one.spray_pass[0] for one in view.passes]
     hits = [not at.any() or float(view.landing[at].mean()) >= LEAST_LANDING for at in passes]
@@ -143,7 +137,8 @@ def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
     yield f'{which} the part, next to none of that paint goes over it: {cause}'
 
 
-def _other_unit(view: GunView) -> str:
+def _elsewhere(view: GunView, boxes: str) -> str:
+    """Poses or mesh in another unit, or poses that are nowhere over the part."""
     part, way = (
         float(np.linalg.norm(np.ptp(positions, axis=0)))
         for positions in (view.surface.vertices_m, view.path.position_m)
@@ -167,10 +162,6 @@ def _other_unit(view: GunView) -> str:
             f'the mesh looks like millimetres: it spans {part:.3g} m, the poses {way:.3g} m; use '
             '--mesh-scale 0.001, or mesh_scale: 0.001 in a campaign'
         )
-    return ''
-
-
-def _not_over(view: GunView, boxes: str) -> str:
     if view.over.any():
         return ''
     nearest = float(view.distance_m.min())
@@ -186,10 +177,20 @@ def _not_over(view: GunView, boxes: str) -> str:
     )
 
 
-def _wrong_axis(view: GunView, boxes: str) -> str:
+def _misaimed(view: GunView, boxes: str) -> str:
+    """A tool whose z does not look at the part, or a TCP far from where the model has it."""
     lean = float(np.median(view.off_normal_deg[view.over]))
     if lean < LEANING_DEG:
-        return ''
+        nominal = view.model.projection.nominal_standoff_m
+        standoff = float(np.median(view.distance_m[view.over]))
+        if abs(standoff - nominal) < OFF_PLANE * nominal:
+            return ''
+        line = (
+            f'the TCP is {standoff:.2f} m from the surface, where the model plane is '
+            f'{nominal:.2f} m from it: check that the TCP is the centre of the bell cup, and the '
+            "part's pose; if they are right, calibrate at this standoff"
+        )
+        return line if standoff < TOO_FAR_TO_PAINT_M else f'{line}; {boxes}'
     path = view.path.select(view.over)
     travel = path.velocity_m_per_s / np.maximum(path.speed_m_per_s, 1e-9)[:, None]
     along = float(np.median(np.abs(np.einsum('ij,ij->i', path.rotation[:, :, 2], travel))))
@@ -216,19 +217,6 @@ def _wrong_axis(view: GunView, boxes: str) -> str:
         f'tool z is {lean:.0f} degrees off the surface normal, now this way and now that, as if '
         f'the poses were in another frame than the mesh: {boxes}; {remedy}'
     )
-
-
-def _off_model_plane(view: GunView, boxes: str) -> str:
-    nominal = view.model.projection.nominal_standoff_m
-    standoff = float(np.median(view.distance_m[view.over]))
-    if abs(standoff - nominal) < OFF_PLANE * nominal:
-        return ''
-    line = (
-        f'the TCP is {standoff:.2f} m from the surface, where the model plane is {nominal:.2f} m '
-        "from it: check that the TCP is the centre of the bell cup, and the part's pose; if they "
-        'are right, calibrate at this standoff'
-    )
-    return line if standoff < TOO_FAR_TO_PAINT_M else f'{line}; {boxes}'
 
 
 def _aside(view: GunView, passes: list[SprayPath]) -> str:

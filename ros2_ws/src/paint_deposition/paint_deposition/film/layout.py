@@ -22,8 +22,8 @@ def model_constants(model: DepositionModel) -> np.ndarray:
         # Stands for a gain of nothing, which has no logarithm [um/s].
         c[kernel.RING], c[kernel.CENTRE] = np.log2(np.maximum([ring, centre], 1e-30))
         c[kernel.RADIUS] = planar.r_m
-        c[kernel.NARROW1] = 0.5 * np.log2(np.e) / planar.sigma1_m**2
-        c[kernel.NARROW2] = 0.5 * np.log2(np.e) / planar.sigma2_m**2
+        c[kernel.NARROW1] = 0.5 * math.log2(math.e) / planar.sigma1_m**2
+        c[kernel.NARROW2] = 0.5 * math.log2(math.e) / planar.sigma2_m**2
         c[kernel.COS] = planar.K3 * np.cos(planar.phi_rad)
         c[kernel.SIN] = planar.K3 * np.sin(planar.phi_rad)
         c[kernel.NEAREST] = model.projection.nearest_m
@@ -50,7 +50,8 @@ def term_weights(planar: PlanarPattern) -> tuple[np.ndarray, np.ndarray]:
     ]
     film = ring * whole_ring + centre * centred
     # The normalisation gamma is a square of lengths: r d/dr + sigma1 d/dsigma1 doubles it.
-    log_gamma_by_r = p.gamma_by_r_m / p.gamma_m2
+    within_r = math.erf(p.r_m / (math.sqrt(2.0) * p.sigma1_m))
+    log_gamma_by_r = (2.0 * math.pi) ** 1.5 * p.sigma1_m * within_r / p.gamma_m2
     log_gamma_by_sigma = 2.0 - p.r_m * log_gamma_by_r
     by_cos, by_sin = ring * np.eye(kernel.TERMS)[[kernel.BY_COS, kernel.BY_SIN]]
     return film, np.stack([

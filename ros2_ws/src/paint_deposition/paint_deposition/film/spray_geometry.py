@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.gun_view import GunView, geometry_warnings
@@ -109,13 +110,13 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> tu
 
     The part is turned to the gun; of the model, pattern and projection count, effects do not.
     """
-    edges, count = surface.curved_edges, len(surface.curved_edges.middles_m)
+    edges, count = surface.curved_edges, len(surface.curved_edges)
     if not count:
         return 0.0, ''
     some = slice(None, None, 1 + len(surface.vertices_m) // VERTICES)
     points = SurfacePoints(
-        np.concatenate([edges.middles_m, edges.curved_m, surface.vertices_m[some]]),
-        np.concatenate([edges.normals, edges.curved_normals, surface.normals[some]]),
+        np.concatenate([edges['middle_m'], edges['curved_m'], surface.vertices_m[some]]),
+        np.concatenate([edges['normal'], edges['curved_normal'], surface.normals[some]]),
     )
     painted = FilmIntegrator(points, model.model_copy(update={'effects': ()}))
     film_um = painted.raw_of(path.select(slice(None, None, 1 + len(path) // SUB_STEPS)))
@@ -123,15 +124,15 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> tu
     if peak_um == 0.0:
         return 0.0, ''
     error_um = np.abs(film_um[count : 2 * count] - film_um[:count])
-    worst = int(error_um.argmax())
-    share, edge_m = float(error_um[worst] / peak_um), float(edges.lengths_m[worst])
+    share, worst = float(error_um.max() / peak_um), edges[error_um.argmax()]
     if share <= WANTED:
         return share, ''
-    place = ', '.join(f'{value:.3f}' for value in edges.middles_m[worst])
+    edge_m, turn_deg = float(worst['length_m']), np.degrees(worst['turn_rad'])
+    place = ', '.join(f'{value:.3f}' for value in worst['middle_m'])
     return share, (
         f'the mesh is coarser than its curvature allows: the film is off by up to '
         f'{100 * share:.1f} % of its peak near ({place}) m, where an edge of '
-        f'{1e3 * edge_m:.0f} mm turns by {np.degrees(edges.turns_rad[worst]):.0f} degrees; export '
+        f'{1e3 * edge_m:.0f} mm turns by {turn_deg:.0f} degrees; export '
         f'it finer, with edges of about {1e3 * SAFETY * edge_m * WANTED / share:.1g} mm there'
     )
 
@@ -140,13 +141,21 @@ def facet_errors_um(
     surface: Surface, points: SurfacePoints, path: SprayPath, model: DepositionModel
 ) -> np.ndarray:
     """(P,) film on the curve that a mesh stands for less that on its facets, at points [um]."""
-    off_m, turns = surface.curved_edges.off_at(points.positions_m)
-    if not (off_m.any() or turns.any()):
+    edges, positions_m = surface.curved_edges, points.positions_m
+    if not len(edges):
         return np.zeros(len(points))
-    normals = points.normals + turns
+    # A point within a triangle lies near the middles of its sides, and of few others. What an
+    # edge's middle has fades toward its ends: at corners the mesh is right.
+    near = range(1, 1 + min(8, len(edges)))
+    away_m, edge = cKDTree(edges['middle_m']).query(positions_m, near)
+    fading = np.clip(1.0 - (2.0 * away_m / edges['length_m'][edge]) ** 2, 0.0, None) ** 2
+    if not fading.any():
+        return np.zeros(len(points))
+    off_m, turns = edges['curved_m'] - edges['middle_m'], edges['curved_normal'] - edges['normal']
+    normals = points.normals + np.einsum('pk,pkx->px', fading, turns[edge])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     both = SurfacePoints(
-        np.concatenate([points.positions_m, points.positions_m + off_m]),
+        np.concatenate([positions_m, positions_m + np.einsum('pk,pkx->px', fading, off_m[edge])]),
         np.concatenate([points.normals, normals]),
     )
     painted = FilmIntegrator(both, model.model_copy(update={'effects': ()}))

@@ -10,7 +10,7 @@ import hashlib
 import inspect
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, TypeVar
@@ -20,7 +20,6 @@ import numba
 import numpy as np
 from numba import config
 from numba.core.codegen import JITCPUCodegen, get_host_cpu_features
-from numba.core.cpu import CPUContext
 from numba.core.registry import CPUDispatcher, CPUTarget
 from numba.core.target_extension import CPU, dispatcher_registry, jit_registry, target_registry
 
@@ -56,20 +55,10 @@ class Code(JITCPUCodegen):
         return FEATURES
 
 
-class Descriptor(CPUTarget):
-    """Numba's description of the target, with our code generator."""
-
-    @cached_property
-    def _toplevel_target_context(self) -> CPUContext:
-        context = CPUContext(self.typing_context, self._target_name)
-        context._internal_codegen = Code(TARGET_NAME)
-        return context
-
-
 class Dispatcher(CPUDispatcher):
     """Functions that are compiled for the target."""
 
-    targetdescr = Descriptor(TARGET_NAME)
+    targetdescr = CPUTarget(TARGET_NAME)
 
 
 def njit(*functions: Callable[..., Any], nopython: bool = True, **options: Any) -> Any:
@@ -82,13 +71,13 @@ target = type(TARGET_NAME, (CPU,), {})
 target_registry[TARGET_NAME] = target
 dispatcher_registry[target] = Dispatcher
 jit_registry[target] = njit
+Dispatcher.targetdescr.target_context._internal_codegen = Code(TARGET_NAME)
 
 Compiled = TypeVar('Compiled', bound=Callable[..., Any])
 
 
-@cache
-def _code_around() -> bytes:
-    return b'\0'.join(file.read_bytes() for file in sorted(Path(__file__).parent.glob('*.py')))
+# What compiles and calls it counts as its code, too.
+AROUND = b'\0'.join(file.read_bytes() for file in sorted(Path(__file__).parent.glob('*.py')))
 
 
 def _compiled_with(value: Any, seen: set[int]) -> Iterator[bytes]:
@@ -138,7 +127,7 @@ def named_for_its_code(
     code refers to the laws' modules by name, so those names count too: the module of a user's own
     effect is named by its source.
     """
-    parts = [_code_around(), repr((numba.__version__, variant)).encode()]
+    parts = [AROUND, repr((numba.__version__, variant)).encode()]
     for law in [function] if laws is None else laws:
         parts.extend(_compiled_with(law, set()))
     digest = hashlib.sha256(b'\0'.join(parts)).hexdigest()[:24]

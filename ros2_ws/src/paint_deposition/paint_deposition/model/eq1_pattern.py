@@ -8,7 +8,6 @@ phi is well-behaved when K3 vanishes.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -51,10 +50,6 @@ PATTERN = (
 EFFECT_BETWEEN_JOBS = 0.6
 
 
-# A fit needs a few patterns again and again, for each part and each effect that it varies.
-PEAKS_KEPT = 64
-
-
 class PlanarPattern(BaseModel):
     """Deposition flux of a stationary bell on the model plane: an asymmetric volcano.
 
@@ -89,12 +84,6 @@ class PlanarPattern(BaseModel):
         ring = r * s * math.sqrt(2.0 * math.pi) * math.erf(r / (math.sqrt(2.0) * s))
         return 2.0 * math.pi * (gaussian + ring)
 
-    @property
-    def gamma_by_r_m(self) -> float:
-        """Derivative of the normalisation by r [m]."""
-        r, s = self.r_m, self.sigma1_m
-        return (2.0 * math.pi) ** 1.5 * s * math.erf(r / (math.sqrt(2.0) * s))
-
     def f(self, x_m: ArrayLike, y_m: ArrayLike) -> np.ndarray:
         """Asymmetry 1 + K3 sin(atan2(y, x) - phi), dimensionless; arrays broadcast."""
         return 1.0 + self.K3 * np.sin(np.arctan2(y_m, x_m) - self.phi_rad)
@@ -122,7 +111,11 @@ class PlanarPattern(BaseModel):
     @property
     def peak_flux_um_per_s(self) -> float:
         """The strongest film growth of eq. (1) [um/s], good to 1e-4."""
-        return _peak_flux_um_per_s(self)
+        # Along this direction f is largest, but has no value at the very centre; the ring's top
+        # lies between the centre and r.
+        towards = self.phi_rad + 0.5 * math.pi
+        rho = np.linspace(0.0, self.r_m, 129) + 1e-6
+        return float(self.flux_um_per_s(rho * math.cos(towards), rho * math.sin(towards)).max())
 
     def radius_of_flux_m(self, fraction: float) -> float:
         """Radius beyond which the flux stays below ``fraction`` of its peak [m]."""
@@ -155,15 +148,6 @@ class PlanarPattern(BaseModel):
         g1 = 2.0 * math.pi * (ring + mirrored) / self.gamma_m2
         g2 = 1.0 - np.exp(-(radius**2) / (2.0 * self.sigma2_m**2))
         return (1.0 - self.K2) * g1 + self.K2 * g2
-
-
-@lru_cache(PEAKS_KEPT)
-def _peak_flux_um_per_s(planar: PlanarPattern) -> float:
-    # Along this direction f is largest, but has no value at the very centre; the ring's top lies
-    # between the centre and r.
-    towards = planar.phi_rad + 0.5 * math.pi
-    rho = np.linspace(0.0, planar.r_m, 129) + 1e-6
-    return float(planar.flux_um_per_s(rho * math.cos(towards), rho * math.sin(towards)).max())
 
 
 # Messages carry the number in 32 bits.

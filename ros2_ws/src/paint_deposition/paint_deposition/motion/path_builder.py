@@ -107,7 +107,13 @@ class PathBuilder:
             self._stream_ns = int(stream.stamps_ns[0])
             self._cut_segments(until_ns=None, finish=True)
             if not self._knows_all_changes:
-                self._restart_trigger(ended_ns if within else None)
+                # Until its first change the gun stays as it was when the stream before ended, if
+                # the clock was set back in its midst; in a replay it is off until then.
+                if self._changes:
+                    passed = bisect_right(self._changes, ended_ns, key=_STAMP) if within else 0
+                    _, flow, brush = self._changes[passed - 1] if passed else (0, 0.0, ONLY_BRUSH)
+                    self._waiting_changes.insert(0, (BEFORE_ALL_NS, flow, brush))
+                self._changes, self._waiting_changes = self._waiting_changes, []
             self._integrated_ns = self._began_ns = None
             self._gap_before_next = True
             self._waiting = [stream]
@@ -140,31 +146,6 @@ class PathBuilder:
         self._finished = [path.select(slice(ready, None))]
         return complete.select(slice(0, ready))
 
-    def _trigger_steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Times (C,) int64 of changes; flow and brush (C + 1,) before, between and after them."""
-        if not self._changes:
-            return np.empty(0, dtype=np.int64), np.ones(1), np.array([ONLY_BRUSH])
-        last_at = {stamp: (flow, brush) for stamp, flow, brush in self._changes}
-        stamps, set_to = np.array([*last_at], np.int64), [(0.0, ONLY_BRUSH), *last_at.values()]
-        flows, brushes = np.array([f for f, _ in set_to]), np.array([b for _, b in set_to])
-        changes = (np.diff(flows) != 0.0) | (np.diff(brushes) != 0)
-        kept = np.append(True, changes)
-        return stamps[changes], flows[kept], brushes[kept]
-
-    def _restart_trigger(self, ended_ns: int | None) -> None:
-        """Go over to a restarted stream, and the changes that waited for it.
-
-        Until the first of them the gun stays as it was when the stream before ended, at
-        ``ended_ns``, if the clock was set back in its midst; None: a replay, off until then.
-        """
-        if self._changes:
-            passed = 0
-            if ended_ns is not None:
-                passed = bisect_right(self._changes, ended_ns, key=_STAMP)
-            _, flow, brush = self._changes[passed - 1] if passed else (0, 0.0, ONLY_BRUSH)
-            self._waiting_changes.insert(0, (BEFORE_ALL_NS, flow, brush))
-        self._changes, self._waiting_changes = self._waiting_changes, []
-
     def _cut_segments(self, until_ns: int | None, finish: bool) -> None:
         if not self._waiting:
             return
@@ -187,7 +168,13 @@ class PathBuilder:
             rows = np.append(rows, ready - 1)
         if len(rows) < 2:
             return
-        cuts, flows, brushes = self._trigger_steps()
+        # Times (C,) of changes of the trigger; flow and brush (C + 1,) before and after each.
+        last_at = {stamp: (flow, brush) for stamp, flow, brush in self._changes}
+        before = (0.0 if last_at else 1.0, ONLY_BRUSH)
+        flows, brushes = map(np.array, zip(before, *last_at.values(), strict=True))
+        changes = (np.diff(flows) != 0.0) | (np.diff(brushes) != 0)
+        kept = np.append(True, changes)
+        cuts, flows, brushes = np.array([*last_at], np.int64)[changes], flows[kept], brushes[kept]
         now = come.select(rows)
         stamp, dwell, position, rotation, velocity, after_gap = split_segments(
             now.stamps_ns, now.positions_m, now.quaternions_xyzw, cuts, self.max_gap_ns,
@@ -198,19 +185,19 @@ class PathBuilder:
             self._gap_before_next = False
             change = np.searchsorted(cuts, stamp, side='right')
             path = SprayPath.of(stamp, dwell, flows[change], position, rotation, velocity)
-            self._finished.append(
-                self._with_strokes_and_passes(path.with_(brush=brushes[change]), after_gap)
-            )
+            path = path.with_(brush=brushes[change])
+            self._finished.append(self._with_strokes_and_passes(path, after_gap, flows[0]))
         # A gap at the end of this batch must be seen by the next one.
         last_step_ns = now.stamps_ns[-1] - now.stamps_ns[-2]
         self._gap_before_next = bool(last_step_ns > self.max_gap_ns)
         self._integrated_ns = int(now.stamps_ns[-1])
         self._waiting = [poses.select(slice(int(rows[-1]), None))]
 
-    def _with_strokes_and_passes(self, path: SprayPath, after_gap: np.ndarray) -> SprayPath:
+    def _with_strokes_and_passes(
+        self, path: SprayPath, after_gap: np.ndarray, flow_before: float
+    ) -> SprayPath:
         """The path with its strokes and passes, and what lies behind each sub-step."""
         if self._states is None:
-            flow_before = float(self._trigger_steps()[1][0])
             self._states = strokes.first_states(flow_before)
             after_gap[0] = False  # Nothing came before the first.
         of_stroke, of_pass, of_trigger = self._states

@@ -209,23 +209,19 @@ class FrameTree:
         """The stamps of the poses of a frame over time."""
         return [stamp for stamp, *_ in self._moving[_name(child)]]
 
-    def _ancestors(self, frame: str, stamp_ns: int) -> list[str]:
-        """A frame, its parent at that time and so on up to the root."""
-        chain, still = [_name(frame)], self._still
-        while len(chain) <= len(still) + len(self._moving):
-            if chain[-1] in still:
-                chain.append(still[chain[-1]][0])
-            elif chain[-1] in self._moving:
-                motion = self._moving[chain[-1]]
-                at_or_before = bisect_right(motion, stamp_ns, key=STAMP) - 1
-                chain.append(motion[max(at_or_before, 0)][1])
-            else:
-                break
-        return chain
-
     def _up(self, one: str, other: str, stamp_ns: int) -> tuple[list[str], list[str]]:
         """The frames from either up to, and without, the first that both are in."""
-        chains = self._ancestors(one, stamp_ns), self._ancestors(other, stamp_ns)
+        chains, still = ([_name(one)], [_name(other)]), self._still
+        for chain in chains:
+            while len(chain) <= len(still) + len(self._moving):
+                if chain[-1] in still:
+                    chain.append(still[chain[-1]][0])
+                elif chain[-1] in self._moving:
+                    motion = self._moving[chain[-1]]
+                    at_or_before = bisect_right(motion, stamp_ns, key=STAMP) - 1
+                    chain.append(motion[max(at_or_before, 0)][1])
+                else:
+                    break
         shared = next((frame for frame in chains[0] if frame in chains[1]), None)
         if shared is None:
             raise NoTransform(f"no transforms connect '{one}' to '{other}'", may_come=True)

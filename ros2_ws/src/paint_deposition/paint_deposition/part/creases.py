@@ -1,9 +1,6 @@
 """Edges of a mesh that was read: creases, which split normals, rims and hems, and cut curves."""
 
-from dataclasses import dataclass
-
 import numpy as np
-import scipy
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.fast_math import cross, difference, dot, length
@@ -118,9 +115,20 @@ def strip_vertices(
     return (2.0 * area < 0.02 * border)[patch]
 
 
-@dataclass(frozen=True)
-class CurvedEdges:
-    """Middles of the E edges of a mesh at which it is furthest from the curve it stands for.
+# An edge of a mesh as it was read, see ``curved_edges``.
+CURVED_EDGE = np.dtype([
+    # Its middle [m] and outward unit normal as the refined mesh has them, and as the curve does.
+    ('middle_m', float, 3), ('normal', float, 3),
+    ('curved_m', float, 3), ('curved_normal', float, 3),
+    ('length_m', float),
+    ('turn_rad', float),  # by which the normals turn along it
+])  # fmt: skip
+
+
+def curved_edges(
+    vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray, half_edges: np.ndarray
+) -> np.ndarray:
+    """(E,) CURVED_EDGE, those at which a mesh is furthest from the curve it stands for.
 
     Between two corners the refined mesh is straight, and its normals turn evenly. A curve through
     the corners does neither. Its slope against the edge, averaged along the edge, is zero, since
@@ -135,62 +143,31 @@ class CurvedEdges:
     with e along the edge (Vlachos et al., Curved PN triangles, 2001, for the same parabola). On a
     plane both are zero. Where the curvature begins or ends, the corners' normals are off
     themselves, and lean shows that, too.
+
+    The triangles are those of a file, whose smooth patches have corners of their own; of each edge
+    one of its half-edges is given, or both. Facets that meet at a crease, see CREASE_RAD, have
+    corners and normals of their own there: a crease is no curve. So is a curve that is drawn with
+    facets at such angles.
     """
-
-    # (E, 3) as the refined mesh has them [m], and outward unit normals.
-    middles_m: np.ndarray
-    normals: np.ndarray
-    # (E, 3) as the curve has them.
-    curved_m: np.ndarray
-    curved_normals: np.ndarray
-    lengths_m: np.ndarray  # (E,) of the edges as they were read [m]
-    turns_rad: np.ndarray  # (E,) by which the normals turn along the edge [rad]
-
-    def off_at(self, positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far the curve is from the mesh at points on it, and by how much the normals turn.
-
-        What an edge's middle has fades toward its ends: at corners both are right. (P, 3) each, to
-        be added to positions [m] and normals.
-        """
-        if not len(self.middles_m):
-            return np.zeros_like(positions_m), np.zeros_like(positions_m)
-        # A point within a triangle lies near the middles of its sides, and of few others.
-        near = min(8, len(self.middles_m))
-        away_m, edge = scipy.spatial.cKDTree(self.middles_m).query(positions_m, range(1, near + 1))
-        fading = np.clip(1.0 - (2.0 * away_m / self.lengths_m[edge]) ** 2, 0.0, None) ** 2
-        off_m, turns = self.curved_m - self.middles_m, self.curved_normals - self.normals
-        return (
-            np.einsum('pk,pkx->px', fading, off_m[edge]),
-            np.einsum('pk,pkx->px', fading, turns[edge]),
-        )
-
-    @staticmethod
-    def of(
-        vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray, half_edges: np.ndarray
-    ) -> 'CurvedEdges':
-        """Find them on the triangles of a file, whose smooth patches have corners of their own.
-
-        Of each edge one of its half-edges is given, or both.
-
-        Facets that meet at a crease, see CREASE_RAD, have corners and normals of their
-        own there: a crease is no curve. So is a curve that is drawn with facets at such angles.
-        """
-        bent = []
-        for some in np.array_split(half_edges, 1 + len(half_edges) // BLOCK):
-            edges = faces.ravel()[np.stack([some, next_half_edge(some)], axis=1)]
-            bent.append(edges[_bends(vertices_m, normals, edges)[0] > LEAST_ERROR])
-        edges = np.unique(np.sort(np.concatenate(bent), axis=1), axis=0)
-        worst_first = np.argsort(-_bends(vertices_m, normals, edges)[0], kind='stable')
-        edges = edges[worst_first[:5000]]
-        _, lengths, lean, sagitta = _bends(vertices_m, normals, edges)
-        start, end = edges.T
-        along = (vertices_m[end] - vertices_m[start]) / lengths[:, None]
-        normal = _unit(normals[start] + normals[end])
-        middle = 0.5 * (vertices_m[start] + vertices_m[end])
-        curved, turned = middle + sagitta[:, None] * normal, normal - 1.5 * lean[:, None] * along
-        cosine = np.einsum('ij,ij->i', normals[start], normals[end])
-        turns = np.arccos(np.clip(cosine, -1.0, 1.0))
-        return CurvedEdges(middle, normal, curved, _unit(turned), lengths, turns)
+    bent = []
+    for some in np.array_split(half_edges, 1 + len(half_edges) // BLOCK):
+        edges = faces.ravel()[np.stack([some, next_half_edge(some)], axis=1)]
+        bent.append(edges[_bends(vertices_m, normals, edges)[0] > LEAST_ERROR])
+    edges = np.unique(np.sort(np.concatenate(bent), axis=1), axis=0)
+    worst_first = np.argsort(-_bends(vertices_m, normals, edges)[0], kind='stable')
+    edges = edges[worst_first[:5000]]
+    _, lengths, lean, sagitta = _bends(vertices_m, normals, edges)
+    start, end = edges.T
+    along = (vertices_m[end] - vertices_m[start]) / lengths[:, None]
+    found = np.empty(len(edges), CURVED_EDGE)
+    found['middle_m'] = 0.5 * (vertices_m[start] + vertices_m[end])
+    found['normal'] = normal = _unit(normals[start] + normals[end])
+    found['curved_m'] = found['middle_m'] + sagitta[:, None] * normal
+    found['curved_normal'] = _unit(normal - 1.5 * lean[:, None] * along)
+    found['length_m'] = lengths
+    cosine = np.einsum('ij,ij->i', normals[start], normals[end])
+    found['turn_rad'] = np.arccos(np.clip(cosine, -1.0, 1.0))
+    return found
 
 
 def _bends(
@@ -210,6 +187,3 @@ def _bends(
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
-
-
-NO_EDGES = CurvedEdges(*[np.empty((0, 3))] * 4, *[np.empty(0)] * 2)

@@ -67,99 +67,78 @@ def refine(
     if len(faces) <= MAX_TRIANGLES and not np.any(longest_m > max_edge_length_m):
         return vertices_m, normals, faces
     _refuse_too_many(face_areas_m2(vertices_m, faces), longest_m, max_edge_length_m)
-    mesh = _Growing(vertices_m, normals)
+    # Edges whose middles are known: once a sliver's edge was cut ahead of its neighbour's, this
+    # has to meet them.
+    keys: np.ndarray = np.empty(0, dtype=np.int64)
+    middles: np.ndarray = keys
     while True:
         edges, of_face = edges_of(faces)
         length_m = np.empty(len(edges))
-        length_m[of_face] = edge_lengths_m(mesh.vertices_m, faces)
-        known = mesh.known_middles(edges)
+        length_m[of_face] = edge_lengths_m(vertices_m, faces)
+        key, known = edges[:, 0] * KEY_BASE + edges[:, 1], np.full(len(edges), -1)
+        row = np.minimum(np.searchsorted(key, keys), len(key) - 1)
+        there = key[row] == keys
+        known[row[there]] = middles[there]
         too_long = length_m > max_edge_length_m
         in_step = known.max() < 0
         if in_step and not too_long.any():
-            return mesh.vertices_m, mesh.normals, faces
+            return vertices_m, normals, faces
         # Slivers, whose sides are three times longer than their base, with both sides too long.
         base_m, side_m, _ = np.sort(length_m[of_face], axis=1).T
         thin = np.flatnonzero(side_m > np.maximum(3.0 * base_m, max_edge_length_m))
         if in_step and len(thin):
             parts = _parts(of_face[thin], length_m, max_edge_length_m)
-            first = mesh.add_cuts(edges, parts)
+            first = len(vertices_m) + np.cumsum(parts - 1) - (parts - 1)
+            edge = np.repeat(np.arange(len(edges)), parts - 1)
+            step = 1 + len(vertices_m) + np.arange(len(edge)) - first[edge]
+            shares = (step / parts[edge])[:, None]
+            vertices_m, normals = _with_points(vertices_m, normals, edges[edge], shares)
+            keys, middles = _middles_of_cuts(edges, parts, first)
             pieces = _cut_slivers(faces[thin], of_face[thin], length_m, parts, first)
             faces = np.concatenate([np.delete(faces, thin, axis=0), pieces])
             continue
         halved = too_long | (known >= 0)
         longest = _close_under_longest(halved, length_m, of_face)
-        middle = mesh.add_middles(edges, halved, known)
-        faces = _split(mesh.vertices_m, faces, middle[of_face], longest)
-
-
-class _Growing:
-    """Vertices with normals, to which middles of edges are added.
-
-    Once a sliver's edge was cut ahead of its neighbour's, those that this has to meet are kept.
-    """
-
-    def __init__(self, vertices_m: np.ndarray, normals: np.ndarray) -> None:
-        self.vertices_m, self.normals = vertices_m, normals
-        self._keys = np.empty(0, dtype=np.int64)
-        self._middles = np.empty(0, dtype=np.int64)
-
-    def known_middles(self, edges: np.ndarray) -> np.ndarray:
-        """(E,) vertex in the middle of each edge where there is one already, else -1."""
-        if not len(self._keys):
-            return np.full(len(edges), -1)
-        key = edges[:, 0] * KEY_BASE + edges[:, 1]
-        place = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
-        return np.where(self._keys[place] == key, self._middles[place], -1)
-
-    def add_middles(self, edges: np.ndarray, halved: np.ndarray, known: np.ndarray) -> np.ndarray:
-        """(E,) middles of the edges to halve, new or known, -1 elsewhere."""
         new = halved & (known < 0)
-        middle = np.where(new, len(self.vertices_m) + np.cumsum(new) - 1, known)
-        self._append(edges[new], np.full((np.sum(new), 1), 0.5))
-        if len(self._keys):
-            self._remember(edges[new, 0], edges[new, 1], middle[new])
-        return middle
+        middle = np.where(new, len(vertices_m) + np.cumsum(new) - 1, known)
+        vertices_m, normals = _with_points(vertices_m, normals, edges[new], 0.5)
+        if len(keys):
+            keys, middles = np.append(keys, key[new]), np.append(middles, middle[new])
+        faces = _split(vertices_m, faces, middle[of_face], longest)
 
-    def add_cuts(self, edges: np.ndarray, parts: np.ndarray) -> np.ndarray:
-        """Add the inner vertices of edges cut into equal parts, (E,) powers of two, 1 is uncut.
 
-        The middles of the edges, of their halves, and so on are known from now on. Returned is
-        (E,) the number of the inner vertex next to each edge's first end.
-        """
-        before = np.cumsum(parts - 1) - (parts - 1)
-        edge = np.repeat(np.arange(len(edges)), parts - 1)
-        step = np.arange(len(edge)) - np.repeat(before - 1, parts - 1)
-        first = len(self.vertices_m) + before
-        self._append(edges[edge], (step / parts[edge])[:, None])
-        self._keys = self._middles = np.empty(0, dtype=np.int64)
-        lower, upper, middle = [], [], []
-        for count in np.unique(parts[parts > 1]).tolist():
-            cut = np.flatnonzero(parts == count)
-            inner = first[cut][:, None] + np.arange(count - 1)
-            points = np.concatenate([edges[cut, :1], inner, edges[cut, 1:]], axis=1)
-            span = count
-            while span > 1:
-                ends = points[:, ::span]
-                one, other = ends[:, :-1].ravel(), ends[:, 1:].ravel()
-                lower.append(np.minimum(one, other))
-                upper.append(np.maximum(one, other))
-                middle.append(points[:, span // 2 :: span].ravel())
-                span //= 2
-        self._remember(*map(np.concatenate, (lower, upper, middle)))
-        return first
+def _with_points(
+    vertices_m: np.ndarray, normals: np.ndarray, edges: np.ndarray, share: np.ndarray | float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The vertices and normals with a point on each edge (N, 2) more, a share (N, 1) along it."""
+    start, end = edges.T
+    points = (1.0 - share) * vertices_m[start] + share * vertices_m[end]
+    between = (1.0 - share) * normals[start] + share * normals[end]
+    between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-12)
+    return np.concatenate([vertices_m, points]), np.concatenate([normals, between])
 
-    def _remember(self, lower: np.ndarray, upper: np.ndarray, middle: np.ndarray) -> None:
-        keys = np.concatenate([self._keys, lower * KEY_BASE + upper])
-        order = np.argsort(keys)
-        self._keys, self._middles = keys[order], np.concatenate([self._middles, middle])[order]
 
-    def _append(self, edges: np.ndarray, share: np.ndarray) -> None:
-        start, end = edges.T
-        points = (1.0 - share) * self.vertices_m[start] + share * self.vertices_m[end]
-        between = (1.0 - share) * self.normals[start] + share * self.normals[end]
-        between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-12)
-        self.vertices_m = np.concatenate([self.vertices_m, points])
-        self.normals = np.concatenate([self.normals, between])
+def _middles_of_cuts(
+    edges: np.ndarray, parts: np.ndarray, first: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Keys and middles of edges cut into equal parts, of their halves, and so on.
+
+    ``parts`` (E,) are powers of two, 1 is uncut; ``first`` (E,) is the number of the inner vertex
+    next to each edge's first end.
+    """
+    keys, middles = [], []
+    for count in np.unique(parts[parts > 1]).tolist():
+        cut = np.flatnonzero(parts == count)
+        inner = first[cut][:, None] + np.arange(count - 1)
+        points = np.concatenate([edges[cut, :1], inner, edges[cut, 1:]], axis=1)
+        span = count
+        while span > 1:
+            ends = points[:, ::span]
+            one, other = ends[:, :-1].ravel(), ends[:, 1:].ravel()
+            keys.append(np.minimum(one, other) * KEY_BASE + np.maximum(one, other))
+            middles.append(points[:, span // 2 :: span].ravel())
+            span //= 2
+    return np.concatenate(keys), np.concatenate(middles)
 
 
 def _parts(of_slivers: np.ndarray, lengths_m: np.ndarray, max_edge_length_m: float) -> np.ndarray:
@@ -186,7 +165,7 @@ def _cut_slivers(
 ) -> np.ndarray:
     """Pieces (P, 3) of slivers (N, 3) whose sides (N, 3) are edges of lengths_m (E,).
 
-    ``parts`` and ``first`` (E,) are as for ``_Growing.add_cuts``.
+    ``parts`` and ``first`` (E,) are as for ``_middles_of_cuts``.
     """
     base = lengths_m[of_slivers].argmin(axis=1)
     # From the tip opposite the base, with the same winding.

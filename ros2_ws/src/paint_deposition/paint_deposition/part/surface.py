@@ -7,6 +7,8 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
 
 from paint_deposition.kernel.blocks import (
     box_centre_m,
@@ -14,7 +16,7 @@ from paint_deposition.kernel.blocks import (
     shared_among_threads,
 )
 from paint_deposition.part import creases, derivatives
-from paint_deposition.part.creases import NO_EDGES, CurvedEdges
+from paint_deposition.part.creases import CURVED_EDGE
 from paint_deposition.part.edges import (
     edge_distance_m,
     half_edges_m,
@@ -32,7 +34,7 @@ from paint_deposition.part.points import (
     outward_side,
 )
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, face_normals, refine
-from paint_deposition.part.visibility import Obstacle, obstacle_of, sky_view_factor
+from paint_deposition.part.visibility import Obstacle, sky_view_factor
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class Surface:
         gun_side: (3,) mean direction from the part to the gun, or None; it shows the painted
             side of a part whose surface has several, a closed body.
         in_hem: (V,) bool, vertices on the narrow strips of a hem or rim; None: there are none.
-        curved_edges: where the mesh as it was read is coarser than its curvature.
+        curved_edges: (E,) CURVED_EDGE, where the mesh as read is coarser than its curvature.
         neighbours: (V,) vertices in the order in which they are painted, see
             ``kernel.blocks.neighbours_together``; None: they are sorted when they are.
     """
@@ -65,7 +67,7 @@ class Surface:
     notes: tuple[str, ...] = ()
     gun_side: np.ndarray | None = None
     in_hem: np.ndarray | None = None
-    curved_edges: CurvedEdges = NO_EDGES
+    curved_edges: np.ndarray = field(default_factory=lambda: np.empty(0, CURVED_EDGE))
     neighbours: np.ndarray | None = None
 
     def __repr__(self) -> str:
@@ -111,7 +113,7 @@ class Surface:
         unjoined = paired[~smooth, 1], clashing.ravel(), single
         hem = paired[rim].ravel()
         half_edges = np.concatenate([paired[:, 0], *unjoined])
-        curved_edges = CurvedEdges.of(corners, read_normals, patches, half_edges)
+        curved_edges = creases.curved_edges(corners, read_normals, patches, half_edges)
         del paired, folds, half_edges, unjoined  # large ones, before the next are made
         vertices, normals, fine = refine(corners, read_normals, patches, max_edge_length_m)
         areas = np.repeat(face_areas_m2(vertices, fine) / 3.0, 3)
@@ -154,8 +156,10 @@ class Surface:
 
     @cached_property
     def obstacle(self) -> Obstacle:
-        """The part as an obstacle to rays."""
-        return obstacle_of(self.tree)
+        """The part as an obstacle to rays; Embree takes a second for a million triangles."""
+        # It works in single precision: coordinates are kept small.
+        scene, corners = EmbreeScene(robust=True), (self.vertices_m - self.centre_m).astype('f4')
+        return scene, self.centre_m, TriangleMesh(scene, corners, self.tree.faces.astype('i4'))
 
     def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(N,) the triangle that each ray meets first, from either side, -1 for none."""
@@ -295,12 +299,14 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
 
 def turned(surface: Surface) -> Surface:
     """The part with its other side outward."""
-    edges = surface.curved_edges
+    edges = surface.curved_edges.copy()
+    for name in ('normal', 'curved_normal'):
+        edges[name] *= -1.0
     return replace(
         surface,
         faces=np.ascontiguousarray(surface.faces[:, ::-1]),
         normals=-surface.normals,
-        curved_edges=replace(edges, normals=-edges.normals, curved_normals=-edges.curved_normals),
+        curved_edges=edges,
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from paint_deposition.kernel.blocks import box_centre_m, shared_among_threads
+from paint_deposition.kernel.blocks import shared_among_threads
 from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.fast_math import cross, difference, dot
 from paint_deposition.part.derivatives import tangents
@@ -121,14 +121,6 @@ BEYOND_THE_PART_M = 1e3
 # A scene, the point (3,) that its coordinates are relative to [m], and its mesh, which the scene
 # does not keep alive by itself.
 Obstacle = tuple[EmbreeScene, np.ndarray, TriangleMesh]
-
-
-def obstacle_of(tree: FaceTree) -> Obstacle:
-    """The faces for Embree, which takes a second for a million of them."""
-    scene, origin_m = EmbreeScene(robust=True), box_centre_m(tree.vertices_m)
-    # Embree works in single precision: coordinates are kept small.
-    corners = (tree.vertices_m - origin_m).astype(np.float32)
-    return scene, origin_m, TriangleMesh(scene, corners, tree.faces.astype(np.int32))
 
 
 def sees(obstacle: Obstacle, eyes_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:

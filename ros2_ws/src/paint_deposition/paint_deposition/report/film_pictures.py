@@ -182,7 +182,22 @@ def _draw_band_legend(
     if s.zones:
         title = 'each zone by its own target,\nof the painted area with a target'
     _draw_patches(shares, entries, title)
-    _draw_histogram(figure.add_subplot(column[1]), surface, film_um, s, zones)
+    # Area over film, of zones in tolerances from their targets, with the band behind it.
+    painted, shown, middle, axis = film_um > s.painted_above_um, film_um, s.target_um, 'film [µm]'
+    if zones:
+        target, tolerance = wanted_at(film_um, s.target_um, s.target_tolerance_um, zones)
+        painted &= tolerance > 0.0
+        shown = np.divide(film_um - target, tolerance, where=painted, out=np.zeros(len(film_um)))
+        (low, high), middle, axis = (-1.0, 1.0), 0.0, '(film − target) / tolerance'
+    film, area = shown[painted], surface.vertex_areas_m2[painted]
+    chart = figure.add_subplot(column[1])
+    quiet(chart, axis, '', size=8.0)
+    chart.set_title('% of the painted area', loc='left', fontsize=8, color=MUTED)
+    chart.axvspan(low, high, color=WITHIN, alpha=0.35, linewidth=0.0)
+    if len(film):
+        chart.hist(film, 40, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
+    for limit in (low, middle, high):
+        chart.axvline(limit, color=MUTED, linewidth=0.9, linestyle='--')
     below = figure.add_subplot(column[2])
     below.set_axis_off()
     text = f'Cpk {s.cpk:.2f}\n{fill(CPK_MEANS, 40)}'.replace('-', '−')
@@ -209,27 +224,6 @@ def _write(axes: Axes, text: str, size: float = 9.5) -> None:
         0.0, 0.0, text, transform=axes.transAxes, va='bottom', fontsize=size, color=INK,
         linespacing=1.6,
     )  # fmt: skip
-
-
-def _draw_histogram(
-    axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmStatistics, zones: Zones | None
-) -> None:
-    """Area over film, of zones in tolerances from their targets, with the band behind it."""
-    painted, shown = film_um > s.painted_above_um, film_um
-    (low, high), middle, axis = s.band_um, s.target_um, 'film [µm]'
-    if zones:
-        target, tolerance = wanted_at(film_um, s.target_um, s.target_tolerance_um, zones)
-        painted &= tolerance > 0.0
-        shown = np.divide(film_um - target, tolerance, where=painted, out=np.zeros(len(film_um)))
-        (low, high), middle, axis = (-1.0, 1.0), 0.0, '(film − target) / tolerance'
-    film, area = shown[painted], surface.vertex_areas_m2[painted]
-    quiet(axes, axis, '', size=8.0)
-    axes.set_title('% of the painted area', loc='left', fontsize=8, color=MUTED)
-    axes.axvspan(low, high, color=WITHIN, alpha=0.35, linewidth=0.0)
-    if len(film):
-        axes.hist(film, 40, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
-    for limit in (low, middle, high):
-        axes.axvline(limit, color=MUTED, linewidth=0.9, linestyle='--')
 
 
 def draw_tool_path(

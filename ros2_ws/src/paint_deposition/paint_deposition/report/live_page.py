@@ -239,40 +239,40 @@ class Page:
         await server.close_all_connections()
 
 
-class _Guarded(RequestHandler):
-    """Refuses whoever lacks the token; a browser keeps it in a cookie."""
+def _guard(handler: RequestHandler) -> None:
+    """Refuse whoever lacks the token; a browser keeps it in a cookie."""
+    page: Page = handler.settings['page']
+    named, refusal = handler.get_argument('token', ''), ''
+    given = named or handler.get_cookie(page.cookie) or ''
+    if page.token and not hmac.compare_digest(given.encode(), page.token.encode()):
+        refusal = 'the token is missing or wrong: use the address with ?token='
+    elif page.token and named:
+        handler.set_cookie(page.cookie, page.token, httponly=True, samesite='Strict')
+    elif not page.token and handler.request.host_name.strip('[]') not in THIS_MACHINE:
+        # Another site's name that leads here, by which its scripts could read the page.
+        refusal = 'open the page as 127.0.0.1 or localhost'
+    if refusal:
+        handler.set_status(403)
+        handler.finish(f'{refusal}\n')
 
-    page: Page
 
-    def prepare(self) -> None:
-        self.page = self.settings['page']
-        token, named = self.page.token, self.get_argument('token', '')
-        given = named or self.get_cookie(self.page.cookie) or ''
-        if token and not hmac.compare_digest(given.encode(), token.encode()):
-            self._refuse('the token is missing or wrong: use the address with ?token=')
-        elif token and named:
-            self.set_cookie(self.page.cookie, token, httponly=True, samesite='Strict')
-        elif not token and self.request.host_name.strip('[]') not in THIS_MACHINE:
-            # Another site's name that leads here, by which its scripts could read the page.
-            self._refuse('open the page as 127.0.0.1 or localhost')
+class _File(StaticFileHandler):
+    """A file of the page."""
+
+    prepare = _guard
 
     def set_default_headers(self) -> None:
         self.set_header('Content-Security-Policy', "default-src 'self'; img-src 'self' data:")
         self.set_header('Cache-Control', 'no-cache')
 
-    def _refuse(self, why: str) -> None:
-        self.set_status(403)
-        self.finish(f'{why}\n')
 
-
-class _File(_Guarded, StaticFileHandler):
-    """A file of the page."""
-
-
-class _Browser(_Guarded, WebSocketHandler):
+class _Browser(WebSocketHandler):
     """A browser, which is sent what it lacks of the scene."""
 
+    prepare = _guard
+
     def open(self, *_: str, **__: str) -> None:
+        self.page: Page = self.settings['page']
         self.page.browsers.add(self)
         self._sending = asyncio.create_task(self._send())
 

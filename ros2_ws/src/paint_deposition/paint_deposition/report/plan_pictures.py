@@ -120,10 +120,11 @@ def write_geometry_picture(
     corners = np.concatenate([surface.vertices_m, spray.position_m])
     sizes = [np.maximum(np.ptp(view.flat(corners), axis=0), 1e-3) for view in views]
     figure = new_figure(11.5, 8.0)
-    grid = figure.add_gridspec(
-        2, 2, width_ratios=_ratios(sizes[0][0], sizes[1][0]),
-        height_ratios=_ratios(sizes[0][1], sizes[2][1]),
-    )  # fmt: skip
+    # Shares of the first view of width and height; none of the others becomes a sliver.
+    front_m, beside_m = sizes[0], np.array([sizes[1][0], sizes[2][1]])
+    across, upward = np.clip(front_m / (front_m + beside_m), 0.3, 0.7)
+    ratios = {'width_ratios': (across, 1.0 - across), 'height_ratios': (upward, 1.0 - upward)}
+    grid = figure.add_gridspec(2, 2, **ratios)
     size_m = float(np.linalg.norm(np.ptp(corners, axis=0)))
     places, names = ((0, 0), (0, 1), (1, 0)), ('from the gun', 'from its right', 'from its top')
     for place, view, name in zip(places, views, names, strict=True):
@@ -146,12 +147,6 @@ def write_geometry_picture(
     words = f'{title}\n{fill(geometry.sentence, 105)}'
     figure.suptitle(words, x=0.02, ha='left', fontsize=11, color=INK)
     return save_picture(figure, path)
-
-
-def _ratios(one: float, other: float) -> tuple[float, float]:
-    """Shares of a side for two views, neither of which becomes a sliver."""
-    share = float(np.clip(one / (one + other), 0.3, 0.7))
-    return share, 1.0 - share
 
 
 def _draw_gun(axes: Axes, view: View, surface: Surface, spray: SprayPath, size_m: float) -> None:
