@@ -186,14 +186,14 @@ def _measured(
 ) -> tuple[Part, Judged]:
     """The part as read in one session, and what the judge needs of its points."""
     noise, table, unseen = case.noise, experiment.readings, experiment.heldout
-    session = measure(table.point, table.film_um, table.expected_um, noise, rng)
+    read_um, level, zero_um = measure(table.point, table.film_um, table.expected_um, noise, rng)
     log, texture = experiment.log, np.hypot(noise.texture, TRACED)
     part = Part(
         experiment.name, experiment.vertices_m, experiment.faces, log.stamps_ns, log.positions_m,
         log.quaternions_xyzw, log.trigger_stamps_ns, log.trigger_on, table.positions_m,
-        table.point, session.thickness_um, table.sigma_um if case.stated else None,
+        table.point, read_um, table.sigma_um if case.stated else None,
         unseen.positions_m,
-        unseen.film_um * (session.level - 1.0) + unseen.expected_um + session.offset_um,
+        unseen.film_um * (level - 1.0) + unseen.expected_um + zero_um,
         np.hypot(noise.sigma_um(unseen.expected_um), texture * unseen.film_um),
     )  # fmt: skip
     _, first, count = np.unique(table.point, return_index=True, return_counts=True)

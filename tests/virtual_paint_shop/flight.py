@@ -206,11 +206,6 @@ def fly(
     return Landings(point, film, time_s, hits[:, 1:4], hits[:, 4], hits[:, 5], hits[:, 6:9])
 
 
-def film_um(landings: Landings, points: int, kept: np.ndarray | float = 1.0) -> np.ndarray:
-    """Film at each gauge point; `kept` is the share of each landing that stays."""
-    return np.bincount(landings.point, landings.film_um * kept, minlength=points)
-
-
 def _surface_grid(part: Part) -> tuple[float, float, np.ndarray]:
     x0, z0 = -0.5 * part.width_m - OUTLINE_MARGIN_M, -OUTLINE_MARGIN_M
     x = np.arange(x0, 0.5 * part.width_m + OUTLINE_MARGIN_M + GRID_M, GRID_M)[None, :]

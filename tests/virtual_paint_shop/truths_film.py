@@ -28,25 +28,22 @@ class Sag(Truth):
         change = RectBivariateSpline(xs, fine_z, after - before, kx=3, ky=1)
         return film_um + change.ev(x, z)
 
-    def run_down(self, film_um, dz_m):
-        return run_down(film_um, dz_m, self.amplitude, self.power, self.yield_um)
+    def run_down(self, film_um: np.ndarray, dz_m: float) -> np.ndarray:
+        """Film (columns, heights bottom to top) after running: its flux ~ (T - yield)^power."""
+        power, yield_um = self.power, self.yield_um
+        total = self.amplitude / (SAG_REFERENCE_UM - yield_um) ** power
+        moving = np.maximum(film_um - yield_um, 0.0)
+        fastest = power * total * moving.max() ** (power - 1.0)
+        steps = int(np.ceil(2.0 * fastest / dz_m)) + 8
+        for weight in np.full(steps, 1.0 / steps):
+            crossing = total * weight * np.maximum(film_um - yield_um, 0.0) ** power
+            arriving = np.concatenate([crossing[:, 1:], np.zeros((len(film_um), 1))], axis=1)
+            film_um = film_um + (arriving - crossing) / dz_m
+        return film_um
 
 
 variant(Sag, 'yield', 'A yield stress: only film above 8 um runs.', yield_um=8.0)
 variant(Sag, 'shear_thinning', 'A power-law fluid of index 0.6.', power=2.0 + 1.0 / 0.6)
-
-
-def run_down(film_um: np.ndarray, dz_m: float, volume_um_m: float, power, yield_um) -> np.ndarray:
-    """Film (columns, heights bottom to top) after running down: its flux ~ (T - yield)^power."""
-    total = volume_um_m / (SAG_REFERENCE_UM - yield_um) ** power
-    moving = np.maximum(film_um - yield_um, 0.0)
-    fastest = power * total * moving.max() ** (power - 1.0)
-    steps = int(np.ceil(2.0 * fastest / dz_m)) + 8
-    for weight in np.full(steps, 1.0 / steps):
-        crossing = total * weight * np.maximum(film_um - yield_um, 0.0) ** power
-        arriving = np.concatenate([crossing[:, 1:], np.zeros((len(film_um), 1))], axis=1)
-        film_um = film_um + (arriving - crossing) / dz_m
-    return film_um
 
 
 class OversprayFog(Truth):

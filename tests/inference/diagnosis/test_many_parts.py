@@ -35,8 +35,9 @@ def test_an_effect_that_grows_over_each_day_is_named_with_its_mean(tmp_path):
     for row in range(PARTS):
         share = row % A_DAY / (A_DAY - 1)
         film_um = shown.clean_um + share * (shown.expected_um - shown.clean_um)
-        read = measure(shown.point, film_um, film_um, GaugeNoise(level=0.015), stream(row, 80))
-        taken = reading(door, read.thickness_um).readings
+        noise = GaugeNoise(level=0.015)
+        read_um, *_ = measure(shown.point, film_um, film_um, noise, stream(row, 80))
+        taken = reading(door, read_um).readings
         taken = taken.select(np.arange(READINGS) % TURNS == row % TURNS)
         parts.append(replace(door.with_readings(taken), name=f'part {row}'))
     pattern = painted.truth['pattern']
