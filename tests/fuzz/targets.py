@@ -32,42 +32,16 @@ GAUGE_JSON = (
     b'{"unit": "um", "results": [{"x_m": 0, "y_m": 0, "z_m": 0, "thickness_um": 20, "id": "a"}, '
     b'{"x_m": 0, "y_m": 0, "z_m": 1, "thickness_um": 21.5, "id": null}]}'
 )
+# What none of the programs under tests/files has.
 RAPID = rb"""MODULE Door
-  PERS wobjdata wobjDoor:=[FALSE,TRUE,"",[[900,0,600],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
   CONST robtarget p1:=[[0,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
-  VAR robtarget p2;
-  VAR triggdata gunOn;
-  VAR num n{2}:=[1,2];
   PROC main()
-    TriggIO gunOn,0\Start\DOp:=doGun,1;
-    p2:=Offs(p1,0,0,100*(1+2));
-    MoveJ p1,vmax,z10,tBell\WObj:=wobjDoor;
-    TriggL RelTool(p2,0,10,0),v500,gunOn,fine,tBell\WObj:=wobjDoor;
-    MoveC p1,p2,v100\V:=200,z50,tBell;
     MoveLDO p1,v50,z1,tBell,doGun,0;
-    SetBrush 3;
-    PaintL p1,v200\T:=2,fine,tBell;
-    IF n{1}=2 THEN
-      WaitTime 1;
-    ENDIF
     FOR i FROM 1 TO 3 STEP 2 DO
-      rStroke i\brush:=Round(i/2);
+      MoveC Offs(p1,0,Round(i/2),0),Offs(p1,i,9,0),v100\V:=200,z50,tBell;
     ENDFOR
-    WHILE n{2}<3 AND NOT TestDI(di1) OR n{2}=2 DO
-      Incr n{2};
-    ENDWHILE
+    IF NOT TestDI(di1) OR FALSE TPWrite "x";
   ENDPROC
-  PROC rStroke(INOUT num i \num brush)
-    VelSet 50,800;
-    TEST i
-    CASE 1,2: SetBrush brush\X:=-10;
-    DEFAULT: p2.trans.x:=f(i);
-    ENDTEST
-    PaintL p2,v500,z10,tBell\WObj:=wobjDoor;
-  ENDPROC
-  FUNC num f(num i)
-    RETURN i mod 2;
-  ENDFUNC
 ENDMODULE
 """
 ZONES = b"""zones:
@@ -81,10 +55,6 @@ trajectory: panel_577
 grid: {K2: [0.1, 0.2], speed_factor: {from: 0.5, to: 1.5, steps: 3}}
 sample: {count: 3, seed: 1, vary: {K3: [0.1, 0.2]}}
 """
-POSES = (
-    b'time_s,x_mm,y_mm,z_mm,qx,qy,qz,qw,spraying\n0,0,0,0,0,0,0,1,1\n0.1,10,0,0,0,0,0,1,0\n',
-    b't;x [m];y [m];z [m];rx [deg];ry [deg];rz [deg]\n0;0;0;0;0;0;0\n0,1;0,01;0;0;0;0;90\n',
-)
 
 
 @dataclass(frozen=True)
@@ -202,12 +172,15 @@ def targets() -> dict[str, Target]:
     rows = [['x_m', 'y_m', 'z_m', 'thickness_um'], [0.1, 0.0, 0.2, 24.5], [0.2, 0.0, 0.2, 'n/a']]
     book = _written(lambda path: write_workbook(path, {'Readings': rows}), 'book.xlsx')
     ros1 = _written(lambda path: write_bag(path, _entries(True), 'ros1'), 'run.bag')
-    readings = [path.read_bytes() for path in sorted(LAYOUTS.glob('*.txt'))]
+    readings, poses, programs = (
+        [path.read_bytes() for path in sorted(LAYOUTS.parents[1].glob(names))]
+        for names in ('tables/layouts/*.txt', 'tables/poses/*.csv', 'rapid/programs/*.mod')
+    )
     model = (SAMPLES.parents[3] / 'config/model.yaml').read_bytes()
     campaign = (SAMPLES / 'measured_door/campaign.yaml').read_bytes()
     return {
         'rapid': Target(
-            '.mod', pd.read_recording, [RAPID],
+            '.mod', pd.read_recording, [RAPID, *programs],
             r'PROC ENDPROC MoveL MoveC PaintL TriggL SetDO SetAO Offs( RelTool( wobj0 [[ ]] := '
             '{1} .trans /0 not 9E9 - FOR WHILE TRUE DO ENDFOR IF TEST RETURN Incr UseBrushTab ,',
         ),
@@ -219,7 +192,7 @@ def targets() -> dict[str, Target]:
             '.csv', lambda path: MeasuringPoints.read(path, Layout(), None), [points], cells
         ),
         'points': Target('.csv', read_points, [points], cells),
-        'poses': Target('.csv', pd.read_recording, [*POSES], cells),
+        'poses': Target('.csv', pd.read_recording, poses, cells),
         'workbook': Target('.xlsx', pd.read_readings, [book]),
         'worksheet': Target(
             '.xlsx', pd.read_readings, [_member(book, 'sheet1.xml')],
