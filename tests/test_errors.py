@@ -16,8 +16,6 @@ from paint_deposition.errors import did_you_mean
 )
 def test_an_unknown_name_is_answered_with_the_nearest_or_with_all(name, remedy):
     assert did_you_mean(name, ['K1_cm3_per_s', 'K2', 'sigma1_m']) == remedy
-
-
-def test_where_nothing_is_known_that_is_said():
+    # Where nothing is known that is said.
     assert did_you_mean('speed', []) == 'there are: none'
     assert did_you_mean('speed', [], 'give a column') == 'give a column'

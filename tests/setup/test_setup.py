@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-NEEDED_BY_SCRIPTS = ('bash', 'dirname', 'readlink', 'tail', 'uname')
+COMPLETE = ('g++', 'cmake', 'make')
 
 
 @pytest.fixture
@@ -18,16 +18,13 @@ def prerequisites(repository, tmp_path):
     """`prerequisites(tools, **variables)`: the check on a machine that has only these tools."""
 
     def run(tools, **variables):
-        for tool in (*NEEDED_BY_SCRIPTS, *tools):
+        for tool in ('bash', 'dirname', 'readlink', 'tail', 'uname', *tools):
             (tmp_path / tool).symlink_to(shutil.which(tool))
         environment = {'PATH': str(tmp_path), 'PYTHON': sys._base_executable, **variables}
         script = repository / 'setup' / 'prerequisites.sh'
         return subprocess.run([script], env=environment, capture_output=True, text=True)
 
     return run
-
-
-COMPLETE = ('g++', 'cmake', 'make')
 
 
 def test_complete_machine_names_its_python(prerequisites):

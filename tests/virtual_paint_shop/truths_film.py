@@ -52,17 +52,14 @@ class OversprayFog(Truth):
     id, family, typical, most, unit = 'overspray_fog', 'level', 1.0, 6.0, 'um'
 
     def on_film(self, film_um, x, z, scene, film_at):
-        return film_um + self.amplitude
+        return film_um + self.amplitude * self.settled(x / (0.5 * scene.part.width_m))
+
+    def settled(self, aside: np.ndarray) -> np.ndarray:
+        return 1.0
 
 
-class FogThinsOut(OversprayFog):
-    """A cloud over the part's middle that thins out towards its sides by a third."""
-
-    form = 'thins_out'
-
-    def on_film(self, film_um, x, z, scene, film_at):
-        side = np.abs(x) / (0.5 * scene.part.width_m)
-        return film_um + self.amplitude * (1.0 - 0.35 * side**2)
+variant(OversprayFog, 'thins_out', "A cloud over the part's middle, less by a third at the sides.",
+        settled=lambda self, aside: 1.0 - 0.35 * np.abs(aside) ** 2)  # fmt: skip
 
 
 class FogGradient(Truth):
@@ -80,16 +77,10 @@ class FogGradient(Truth):
 
 variant(FogGradient, 'exponential', 'Fog that is used up on its way: e-fold over a third.',
         settled=lambda self, share: np.exp(-3.0 * share))  # fmt: skip
-
-
-class FogLayer(FogGradient):
-    """A layer of fog over the floor that reaches up to some height of the part."""
-
-    form = 'layer'
-    ranges = between(top=(0.25, 0.6))
-
-    def settled(self, share):
-        return 1.0 / (1.0 + np.exp((share - self.drawn['top']) / 0.07))
+variant(FogGradient, 'layer', 'Fog over the floor that reaches up to some height of the part.',
+        ranges=between(top=(0.25, 0.6)),
+        settled=lambda self, share: 1.0 / (1.0 + np.exp((share - self.drawn['top']) / 0.07)),
+        )  # fmt: skip
 
 
 class GaugeGain(Truth):

@@ -58,7 +58,6 @@ def test_nothing_is_found_where_nothing_is_missing(clean):
     assert figures.part_share == 0.0
     assert figures.footprint_of_peak < 0.15
     assert str(figures) in nothing_found.notes
-    assert nothing_found.to_dict()['classes'] == []
 
 
 def test_the_effect_is_named_and_predicts_readings_left_out(found):
@@ -77,16 +76,10 @@ def test_the_effect_is_named_and_predicts_readings_left_out(found):
     content = json.loads(json_text(found.to_dict()))
     one = content['classes'][0]
     assert content['accepted'] == [one['best']] == [one['members'][0]] == [best.best]
-    assert set(content['not_testable']) <= set(EFFECTS)
     assert content['regions'][0]['mean_residual_um'] < 0.0  # too little paint in the valley
-    errors = {'before': before.holdout_rmse_um, 'after': after.holdout_rmse_um}
-    assert one['holdout_rmse_um'] == errors
-    figures = content['rmse_um']
-    assert {when: figures[f'holdout_{when}'] for when in errors} == errors
-    assert figures['left_out'] == 'points'
+    assert content['rmse_um']['left_out'] == 'points'
     (part,) = content['experiments']
     assert [part['rmse_before_um'], part['rmse_after_um']] == [before.rmse_um, after.rmse_um]
-    assert [figures['before'], figures['after']] == [before.rmse_um, after.rmse_um]
 
 
 def test_an_effect_outside_the_library_is_not_blamed_on_another(tmp_path):

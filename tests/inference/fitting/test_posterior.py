@@ -90,27 +90,15 @@ def test_no_reading_counts_twice_and_other_settings_of_the_process_are_told(pane
         assert jobs.prior_for(posterior, thicker(panel, **settings)) == (posterior, ())
 
 
-FIT = linear_fit(np.random.default_rng(0), 20, parameters=KNOWN)
-PRIOR = KNOWN.prior
-
-
-def moved_by(away: np.ndarray) -> PatternShift:
-    """By this vector from the centre of what was known."""
-    shift = PatternShift.of(replace(FIT, vector=PRIOR.centre + away))
-    assert shift is not None
-    return shift
-
-
-def test_the_calibrated_pattern_has_not_moved_and_without_one_there_is_no_distance():
-    assert PatternShift.of(linear_fit(np.random.default_rng(0), 20, parameters=PARAMETERS)) is None
-    still = moved_by(np.zeros(len(PATTERN)))
-    assert still.distance == pytest.approx(0.0)
-    assert not still.is_alarming
-
-
 def test_jobs_that_differ_as_assumed_are_as_far_as_told():
+    fit, prior = linear_fit(np.random.default_rng(0), 20, parameters=KNOWN), KNOWN.prior
+
+    def moved_by(away: np.ndarray) -> PatternShift:
+        """By this vector from the centre of what was known."""
+        return PatternShift.of(replace(fit, vector=prior.centre + away))
+
     draws = np.random.default_rng(1).normal(size=(500, len(PATTERN)))
-    shifts = [moved_by(PRIOR.factor @ draw) for draw in draws]
+    shifts = [moved_by(prior.factor @ draw) for draw in draws]
     squares = np.array([shift.distance for shift in shifts]) ** 2
     assert kstest(squares, chi2(len(PATTERN)).cdf).pvalue > 0.01
     first = np.array([shift.by_coordinate['log_K1'] for shift in shifts])
@@ -118,7 +106,7 @@ def test_jobs_that_differ_as_assumed_are_as_far_as_told():
     assert np.mean(np.sqrt(squares) < shifts[0].usual) == pytest.approx(0.95, abs=0.03)
     assert sum(shift.is_alarming for shift in shifts) <= 5
     # A bell of another kind is warned of by what differs most.
-    other = moved_by(8.0 * PRIOR.width[4] * (np.arange(len(PATTERN)) == 4))
+    other = moved_by(8.0 * prior.width[4] * (np.arange(len(PATTERN)) == 4))
     assert other.is_alarming
     assert 'most in r_m (+8.0)' in other.warning
     assert other.to_dict()['by_coordinate']['r_m'] == pytest.approx(8.0)
