@@ -49,10 +49,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if 'ros_domain' in item.fixturenames:
             item.add_marker('slow')
-    rooms = [item.path.relative_to(REPOSITORY / 'tests').parts[0] for item in items]
     first = {room: place for place, room in enumerate(LONGEST)}
-    order = sorted(range(len(items)), key=lambda row: first.get(rooms[row], len(first)))
-    items[:] = [items[row] for row in order]
+    tests = REPOSITORY / 'tests'
+    items.sort(key=lambda item: first.get(item.path.relative_to(tests).parts[0], len(first)))
 
 
 @pytest.fixture(scope='session')

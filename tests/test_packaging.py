@@ -128,7 +128,7 @@ def launched(*arguments: str) -> str:
     return done.stdout + done.stderr
 
 
-def test_launch_file_describes_every_node():
+def test_launch_file_describes_every_node_and_leaves_the_rest_to_a_file_of_ones_own(tmp_path):
     given = {'record': 'runs', 'measurements': 'readings.csv', 'urdf': 'arm.urdf', 'page': 'true'}
     nodes = wanted(bag='run', rate='2', publish_clock='false', **given) | wanted(**given)
     assert set(nodes) == set(NODES) - {'egm_source', 'opcua_source', 'rws_source'}
@@ -136,17 +136,12 @@ def test_launch_file_describes_every_node():
         assert set(parameters) <= set(table_of(node))
     assert set(wanted()) == {'deposition_simulator', 'index_planner'}
     assert wanted(trigger='/gun')['atomizer_source'] == {'trigger': '/gun'}
-
-
-def test_launch_leaves_what_is_not_given_to_a_parameter_file_of_ones_own(tmp_path):
     own = tmp_path / 'own.yaml'
     own.write_text('')
     nodes = wanted(parameters=str(own), bag='run', page='true')
     assert nodes.pop('bag_player') == {'bag': 'run', 'wait_for_subscribers': 2}
     assert nodes == {'deposition_simulator': {}, 'index_planner': {}, 'web_view': {}}
-
-
-def test_launch_takes_the_robot_of_a_bag_from_the_bag():
+    # The robot of a bag is taken from the bag.
     for given, told in (
         ({'urdf': 'arm.urdf'}, {'urdf': 'arm.urdf'}),
         ({'base_frame': 'world'}, {'tf': ['world', 'tool0']}),

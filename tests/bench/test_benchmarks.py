@@ -143,10 +143,7 @@ def test_an_interval_covers_as_often_as_it_says():
         low, high = scores.interval(values)
         hits += low <= 0.5 <= high
     assert hits / 50 >= 0.86
-
-
-def test_never_is_not_known_from_few_campaigns():
-    """Zero of three campaigns, however often redrawn: up to 1 - 0.025^(1/3)."""
+    # Zero of three campaigns, however often redrawn: up to 1 - 0.025^(1/3).
     values = [(str(k % 3), 0.0) for k in range(60)]
     assert scores.interval(values) == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 3)))
     assert 'none' in str(scores.Row('nothing', []))

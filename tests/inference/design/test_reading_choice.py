@@ -117,7 +117,7 @@ def film_um(sample_panel, one, model=BELL):
     return Forward(pd.Campaign((one.sprayed(sample_panel),)), model.effects).predict_um(model)
 
 
-def test_the_gun_stands_square_before_a_spot_at_the_distance_of_the_passes(sample_panel, one):
+def test_the_gun_stands_square_before_a_spot_as_far_and_as_long_as_suits(sample_panel, one):
     path = one.sprayed(sample_panel).path
     assert path.rotation[:, :, 2] == pytest.approx(np.tile(-one.normal, (len(path), 1)), abs=1e-9)
     away = path.position_m - one.position_m
@@ -126,9 +126,7 @@ def test_the_gun_stands_square_before_a_spot_at_the_distance_of_the_passes(sampl
     assert path.speed_m_per_s.max() == 0.0
     # The tool is turned about its axis as it was on the passes.
     assert one.across @ sample_panel.path.rotation[0, :, 0] > 0.99
-
-
-def test_the_film_stays_within_the_one_given_and_comes_near_it(sample_panel, one):
+    # The film stays within the one given and comes near it.
     film = film_um(sample_panel, one)
     assert 0.7 * MOST_UM < film.max() <= one.peak_um <= MOST_UM
     half = film_um(sample_panel, replace(one, dwell_s=0.5 * one.dwell_s))

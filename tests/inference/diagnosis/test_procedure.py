@@ -29,11 +29,6 @@ def shielded(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
-def found(shielded):
-    return diagnose(shielded, BASE, EFFECTS)
-
-
-@pytest.fixture(scope='module')
 def clean(tmp_path_factory) -> Experiment:
     """A door painted as the model says, all readings in one group."""
     options = DOOR | {'seed': 3, 'truth': None}
@@ -60,7 +55,8 @@ def test_nothing_is_found_where_nothing_is_missing(clean):
     assert str(figures) in nothing_found.notes
 
 
-def test_the_effect_is_named_and_predicts_readings_left_out(found):
+def test_the_effect_is_named_and_predicts_readings_left_out(shielded):
+    found = diagnose(shielded, BASE, EFFECTS)
     assert found.verdict == 'effect_missing'
     assert found.p_value < 0.01
     best = found.classes[0]

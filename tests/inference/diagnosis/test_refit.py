@@ -47,13 +47,9 @@ def test_refit_adds_what_was_asked_for_and_weighs_it(tmp_path):
 HIDDEN = LEARNED['time_s'](low=0.0, high=70.0, learned=(-0.15, 0.0, 0.08, 0.12, 0.13))
 
 
-@pytest.fixture(scope='module')
-def campaign() -> pd.Campaign:
-    """Panels painted with a flow that rises and levels off."""
-    return gauged(pd.DepositionModel(effects=(HIDDEN,)), seed=3, orders=ORDERS)
-
-
-def test_a_law_is_learned_with_its_band_and_its_file_reads_back_and_goes_on(campaign, tmp_path):
+def test_a_law_is_learned_with_its_band_and_its_file_reads_back(tmp_path):
+    """On panels painted with a flow that rises and levels off."""
+    campaign = gauged(pd.DepositionModel(effects=(HIDDEN,)), seed=3, orders=ORDERS)
     done = refit(campaign, BASE, LEARNED['time_s'])
     assert done.verdict == 'unknown_effect'
     assert done.accepted == ('learned:time_s',)
@@ -73,7 +69,7 @@ def test_a_law_is_learned_with_its_band_and_its_file_reads_back_and_goes_on(camp
     away -= np.average(away, weights=sd**-2)
     assert np.mean(np.abs(away) < 1.96 * sd) > 0.9
     assert 1.96 * np.median(sd) < 0.25 * np.ptp(HIDDEN.factor(times))
-    # The model that is written reads back and goes on.
+    # The model that is written reads back.
     known = done.posterior, estimates(done.history[-1].fit)
     write_fitted(tmp_path / 'model.yaml', done.study, done.history, *known)
     file = read_model_file(tmp_path / 'model.yaml')

@@ -27,11 +27,6 @@ def campaign() -> pd.Campaign:
     return pd.Campaign((painted_by(pd.DepositionModel(), passes([1.0]), grid),))
 
 
-@pytest.fixture
-def panel(campaign) -> Experiment:
-    return campaign.experiments[0]
-
-
 def thicker(panel: Experiment, **settings) -> pd.Campaign:
     """Another job, painted at other settings."""
     taken = replace(panel.taken, thickness_um=panel.taken.thickness_um + 0.01)
@@ -67,7 +62,8 @@ def test_effects_are_told_in_their_own_units_and_the_unknown_keeps_its_weak_prio
     assert not both.factor[count:, :count].any()
 
 
-def test_no_reading_counts_twice_and_other_settings_of_the_process_are_told(panel, campaign):
+def test_no_reading_counts_twice_and_other_settings_of_the_process_are_told(campaign):
+    (panel,) = campaign.experiments
     fit = linear_fit(np.random.default_rng(4), 60)
     posterior = posterior_of(fit, campaign)
     assert posterior.readings == (panel.taken.fingerprint,)

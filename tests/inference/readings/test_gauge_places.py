@@ -45,9 +45,7 @@ def test_spread_places_are_about_as_many_as_wanted_and_apart_and_those_of_a_grid
     # Five rows and five columns, to the spacing of the vertices.
     for axis in range(2):
         assert np.count_nonzero(np.diff(np.sort(face[:, axis])) > 0.1) == 4
-
-
-def test_places_on_a_face_are_found_again():
+    # Places on a face are found again.
     surface = folded(0.3)
     at = np.array([[0.05, 0.1], [0.21, 0.33], [0.3, 0.02]])
     points, hit = places.on_face_m(surface, at)
