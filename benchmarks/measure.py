@@ -62,7 +62,7 @@ class Door:
     @staticmethod
     def of(seed: int) -> 'Door':
         """The door, the gun's path and the bell of this seed."""
-        pattern, (job,) = draw_jobs(seed, [], ('door',), 0.05, None)
+        pattern, (job,) = draw_jobs(seed, [], ('door',))
         surface = Surface.from_triangles(*job.part.mesh(EDGE_M), EDGE_M)
         log = record(job.motion, job.plan.sample_s, stream(seed, 30))
         motion = Trajectory(

@@ -32,11 +32,14 @@ def manifest(package: str) -> ElementTree.Element:
     return ElementTree.parse(SOURCES / package / 'package.xml').getroot()
 
 
+def class_of(node: str) -> type:
+    _, place, name = getattr(executables, node).args
+    return getattr(importlib.import_module(f'{PACKAGE}.nodes.{place}'), name)
+
+
 def table_of(node: str) -> dict:
     """The parameter table of the node's class, by name."""
-    _, place, node_class = getattr(executables, node).args
-    module = importlib.import_module(f'{PACKAGE}.nodes.{place}')
-    return getattr(module, node_class).PARAMETERS
+    return class_of(node).PARAMETERS
 
 
 @pytest.mark.filterwarnings('ignore::DeprecationWarning')
@@ -149,20 +152,15 @@ def test_launch_file_describes_every_node_and_leaves_the_rest_to_a_file_of_ones_
         nodes = wanted(bag='run', **given)
         assert 'atomizer_source' not in nodes
         assert told.items() <= nodes['bag_player'].items()
-
-
-@pytest.mark.parametrize(
-    ('given', 'count'),
-    [
+    # A replay waits for every node that takes poses.
+    for given, count in (
         ({}, 1),
         ({'record': 'runs'}, 2),
         ({'measurements': "painter's.csv"}, 2),
         ({'record': '1', 'measurements': 'readings.csv', 'page': 'true'}, 4),
         ({'wait_for_subscribers': '5'}, 5),
-    ],
-)
-def test_launched_replay_waits_for_every_node_that_takes_poses(given, count):
-    assert wanted(bag='run', **given)['bag_player']['wait_for_subscribers'] == count
+    ):
+        assert wanted(bag='run', **given)['bag_player']['wait_for_subscribers'] == count
 
 
 @pytest.mark.slow

@@ -31,7 +31,6 @@ LAYOUTS = (('panel', 'door'), ('door',), ('panel', 'door', 'door_vertical'))
 LAYOUT_SHARES = (0.5, 0.25, 0.25)
 # Not seen at all beside the pattern, or only on a few points: no partners for a pair.
 ALONE = ('level', 'time', 'visibility')
-OFFSET_M = 0.05
 # Scatter of the film by the number of droplets traced, a share.
 TRACED = 0.004
 # Standard deviations of what a judge takes as free in a pattern; of lengths and volumes a share.
@@ -162,7 +161,7 @@ def paint(
     painted = _painted(case, parcels)
     rng, amplitudes = stream(case.seed, 61), dict(zip(case.truths, case.amplitudes, strict=True))
     truths = choose(list(case.truths), stream(case.seed, 1), amplitudes)
-    pattern, jobs = draw_jobs(case.seed, truths, case.layout, OFFSET_M, None)
+    pattern, jobs = draw_jobs(case.seed, truths, case.layout)
     parts, judged = zip(*(
         _measured(case, experiment, pattern, job, rng)
         for experiment, job in zip(painted.experiments, jobs, strict=True)

@@ -59,20 +59,13 @@ sample: {count: 3, seed: 1, vary: {K3: [0.1, 0.2]}}
 
 @dataclass(frozen=True)
 class Target:
-    """A reader under test.
+    """A reader under test."""
 
-    Attributes:
-        suffix: of the file.
-        read: the reader; what it may raise is PaintError.
-        seeds: files as they should be.
-        words: what is worth inserting.
-        around: the file that holds the bytes as its changing part, for compressed formats.
-    """
-
-    suffix: str
-    read: Callable[[Path], object]
-    seeds: list[bytes]
-    words: str = ''
+    suffix: str  # of the file
+    read: Callable[[Path], object]  # what it may raise is PaintError
+    seeds: list[bytes]  # files as they should be
+    words: str = ''  # what is worth inserting
+    # The file that holds the bytes as its changing part, for compressed formats.
     around: Callable[[bytes], bytes] = field(default=lambda data: data)
 
 

@@ -36,12 +36,10 @@ def test_the_campaigns_hold_the_measured_sprays(table, tmp_path):
 
 @pytest.fixture
 def diagnosed(table: Path, tmp_path):
-    """Diagnoses a campaign made of sprays of a nozzle, by the options of its builder."""
-
-    def diagnose(nozzle: str, **options) -> pd.Diagnosis:
-        return pd.diagnose(pd.read_campaign(spray_campaign(table, nozzle, tmp_path, **options)))
-
-    return diagnose
+    """`diagnosed(nozzle, **options)`: of a campaign, by the options of its builder."""
+    return lambda nozzle, **options: pd.diagnose(
+        pd.read_campaign(spray_campaign(table, nozzle, tmp_path, **options))
+    )
 
 
 def named(diagnosis: pd.Diagnosis) -> list[set[str]]:

@@ -97,15 +97,14 @@ def mobility(u: np.ndarray) -> np.ndarray:
     return carried / carried.mean()
 
 
-def draw_pattern(rng, half_width: float, flow_cm3_per_s: float, emission_offset_m) -> Pattern:
+def draw_pattern(rng, half_width: float, flow_cm3_per_s: float) -> Pattern:
     """A believable bell pattern with the given SB50 (metres).
 
     SB50: full width at half the height of the pattern collapsed along the travel direction.
     """
     ranges = ((0.05, 0.35), (0.0, 0.3), (-np.pi, np.pi), (0.28, 0.40), (0.13, 0.20), (0.20, 0.30))
     shape = (rng.uniform(*limits) for limits in ranges)
-    raw = Pattern(flow_cm3_per_s, *shape, emission_offset_m=emission_offset_m)
-    start = raw.scaled(half_width)
+    start = Pattern(flow_cm3_per_s, *shape).scaled(half_width)
     edges = np.linspace(-0.9, 0.9, 361)
     profile, _ = np.histogram(conner_plume(start, 1 << 15, seed=1).y_m, edges)
     smooth = np.convolve(profile, np.hanning(9) / np.hanning(9).sum(), mode='same')

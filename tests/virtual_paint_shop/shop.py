@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from .doors import Part, flat_panel
-from .draw import EXPERIMENTS, brush_beside, draw_jobs, solids_cm3_per_s, stream, timed
+from .draw import brush_beside, draw_jobs, solids_cm3_per_s, stream, timed
 from .flight import Air, Landings, fly
 from .gauge import GaugeNoise, Readings, Spots, keep_clear, layout, scatter, tabulate
 from .jobs import Job, Log, Plan, record, slices
@@ -58,11 +58,7 @@ def generate(
     style: 'columns', 'rows', 'random' or None for any.
     amplitude: instead of typical x U(0.7, 2), in the effect's unit (dict: by id); scale multiplies
     a drawn one. second_brush: every other pass is painted with a brush 2, so many times as wide.
-    Raises ValueError for a name that does not exist.
     """
-    strange = set(experiments) - set(EXPERIMENTS)
-    if strange:
-        raise ValueError(f'no experiment {strange.pop()!r}; there are: {", ".join(EXPERIMENTS)}')
     truths = choose(truth, stream(seed, 1), amplitude, scale)
     pattern, jobs = draw_jobs(seed, truths, experiments)
     brushes = {} if second_brush is None else {1: pattern, 2: brush_beside(pattern, second_brush)}
@@ -79,7 +75,7 @@ def panel_study(
 ) -> Campaign:  # fmt: skip
     """A flat panel, three passes of a bell (SB50 near 0.57 m), 20 um of film at 0.577 m."""
     rng = stream(seed, 11)
-    pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng), 0.05)
+    pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng))
     speed = pattern.K1_cm3_per_s / (20.0 * 0.577)
     plan = Plan(index_m=index_m, passes=3, standoff_m=0.25, follow=0.0, overrun_m=0.55,
                 gun_margin_m=0.50, teach_error_m=0.0, speed_m_per_s=speed)  # fmt: skip

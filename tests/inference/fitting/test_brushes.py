@@ -32,10 +32,7 @@ SETTINGS = {
     4: {'flow_cm3_per_min': 200.0, 'solids': 0.45, 'bell_speed_rpm': 25e3},
 }
 TRUTH = pd.DepositionModel(
-    brushes=[
-        Brush(number=1, planar=FIRST, **SETTINGS[1]),
-        Brush(number=4, planar=SECOND, **SETTINGS[4]),
-    ]
+    brushes=[Brush(number=n, planar=p, **SETTINGS[n]) for n, p in ((1, FIRST), (4, SECOND))]
 )
 VECTOR = PatternVector((1, 4))
 

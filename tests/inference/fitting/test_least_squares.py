@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 import paint_deposition as pd
 from inference.fitting.panels import PANEL, column, grid_m, painted_by, passes
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import derivatives, fit_readings
@@ -17,6 +16,7 @@ from paint_deposition.inference.fitting.study import FOLDS, TEXTURE_SHARE, Study
 from paint_deposition.model.eq1_pattern import PATTERN, PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import spray_path
+from scenes import painted
 
 BASE = pd.DepositionModel()
 PLANAR = PlanarPattern(
@@ -46,9 +46,8 @@ def exact(forward):
 
 
 def test_readings_without_noise_are_the_film_and_give_the_pattern_back(spotted, exact, forward):
-    integrator = FilmIntegrator(PANEL.at(grid_m()), TRUTH, 'double')
-    integrator.add(spotted.experiments[0].path)
-    assert exact == pytest.approx(integrator.film_um, rel=1e-9)
+    film = painted(PANEL.at(grid_m()), spotted.experiments[0].path, TRUTH, 'double')
+    assert exact == pytest.approx(film.film_um, rel=1e-9)
     assert 5.0 < exact.max() < 100.0
     sigma_um = np.full(len(exact), 0.003)
     fit = fit_readings(forward, exact, sigma_um, FreeParameters.of(BASE), starts=6)
