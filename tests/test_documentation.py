@@ -58,7 +58,9 @@ def test_commands_that_are_shown_have_their_options(page: Path):
 
     context = click.Context(paint)
     unknown = []
-    for line in shown_commands(page):
+    blocks = re.findall(r'```bash\n(.*?)```', page.read_text(encoding='utf-8'), re.DOTALL)
+    lines = '\n'.join(blocks).replace('\\\n', ' ')
+    for line in re.findall(r'^(?:\./)?paint (.*)$', lines, re.MULTILINE):
         name, *words = shlex.split(line.replace('…', ''), comments=True)
         if name not in COMMANDS:
             unknown.append(name)
@@ -91,10 +93,3 @@ def headings(page: Path) -> set[str]:
     """Anchors of a page as GitHub makes them."""
     lines = re.findall(r'^#+ (.*)$', page.read_text(encoding='utf-8'), re.MULTILINE)
     return {re.sub(r'[^\w\- ]', '', line.lower()).replace(' ', '-') for line in lines}
-
-
-def shown_commands(page: Path) -> list[str]:
-    """Arguments of `paint` in the blocks of a page, each on one line."""
-    blocks = re.findall(r'```bash\n(.*?)```', page.read_text(encoding='utf-8'), re.DOTALL)
-    lines = '\n'.join(blocks).replace('\\\n', ' ')
-    return re.findall(r'^(?:\./)?paint (.*)$', lines, re.MULTILINE)

@@ -5,7 +5,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from io import BytesIO
 from pathlib import Path
 
@@ -79,22 +79,13 @@ def _box(kind: str, **options: str) -> bytes:
     return made.encode() if isinstance(made, str) else made
 
 
-def _in_zip(template: bytes, ends_with: str) -> Callable[[bytes], bytes]:
+def _in_zip(template: bytes, member: str, data: bytes) -> bytes:
     """The file with one of its members replaced by the bytes."""
-
-    def around(data: bytes) -> bytes:
-        made = BytesIO()
-        with zipfile.ZipFile(BytesIO(template)) as old, zipfile.ZipFile(made, 'w') as new:
-            for name in old.namelist():
-                new.writestr(name, data if name.endswith(ends_with) else old.read(name))
-        return made.getvalue()
-
-    return around
-
-
-def _member(package: bytes, ends_with: str) -> bytes:
-    with zipfile.ZipFile(BytesIO(package)) as opened:
-        return opened.read(next(n for n in opened.namelist() if n.endswith(ends_with)))
+    made = BytesIO()
+    with zipfile.ZipFile(BytesIO(template)) as old, zipfile.ZipFile(made, 'w') as new:
+        for name in old.namelist():
+            new.writestr(name, data if name == member else old.read(name))
+    return made.getvalue()
 
 
 def _written(write: Callable[[Path], object], name: str) -> bytes:
@@ -164,6 +155,7 @@ def targets() -> dict[str, Target]:
     cells = 'x_mm thickness_um mils [mm] ; \t " 1e308 nan - ,,'
     rows = [['x_m', 'y_m', 'z_m', 'thickness_um'], [0.1, 0.0, 0.2, 24.5], [0.2, 0.0, 0.2, 'n/a']]
     book = _written(lambda path: write_workbook(path, {'Readings': rows}), 'book.xlsx')
+    sheet = 'xl/sheet1.xml'
     ros1 = _written(lambda path: write_bag(path, _entries(True), 'ros1'), 'run.bag')
     readings, poses, programs = (
         [path.read_bytes() for path in sorted(LAYOUTS.parents[1].glob(names))]
@@ -188,8 +180,8 @@ def targets() -> dict[str, Target]:
         'poses': Target('.csv', pd.read_recording, poses, cells),
         'workbook': Target('.xlsx', pd.read_readings, [book]),
         'worksheet': Target(
-            '.xlsx', pd.read_readings, [_member(book, 'sheet1.xml')],
-            '<c r="A1"> <v> </v> t="s" t="d" AAAAA99999999', _in_zip(book, 'sheet1.xml'),
+            '.xlsx', pd.read_readings, [zipfile.ZipFile(BytesIO(book)).read(sheet)],
+            '<c r="A1"> <v> </v> t="s" t="d" AAAAA99999999', partial(_in_zip, book, sheet),
         ),
         'stl': Target('.stl', _mesh, [_box('stl'), _box('stl_ascii')], 'solid facet vertex'),
         'ply': Target(

@@ -6,7 +6,6 @@ import numpy as np
 
 import paint_deposition as pd
 from booth import MODEL, door, painted, panel, path_of, serpentine
-from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
@@ -58,7 +57,7 @@ def plate_with_a_back() -> Experiment:
     return part.with_readings(both)
 
 
-def at_model(study: Study, model=MODEL) -> Fit:
+def at_model(study: Study, model=MODEL):
     """A fit that has found this model."""
     parameters = FreeParameters.of(model, *model.effects)
     return study.beside(parameters, parameters.encode(model))

@@ -8,17 +8,13 @@ import pytest
 from scipy.integrate import dblquad
 from scipy.stats import f, kstest, multivariate_t, norm
 
-import paint_deposition as pd
 from booth import MODEL
 from inference.diagnosis.linear import KNOWN, PARAMETERS, fit_linear, linear_fit, null_of
 from inference.diagnosis.readings_on_door import on_door, on_panel, study_of
 from paint_deposition.effects.catalogue import LEARNED
-from paint_deposition.effects.learned_laws import LearnedLaw, hat_weights
+from paint_deposition.effects.learned_laws import hat_weights
 from paint_deposition.inference.diagnosis import gaussian, smooth_laws
 from paint_deposition.inference.diagnosis.model_space import SIZES
-from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.report.colour_scales import TWO_SIDED_95
 from reference import reference_film_um
 
@@ -133,11 +129,11 @@ LAWS = [law for name, law in LEARNED.items() if name != 'speed_m_per_s']
 
 
 @pytest.fixture(scope='module')
-def study() -> Study:
+def study():
     return study_of(on_door(count=12))
 
 
-def film_um(experiment: Experiment, model: pd.DepositionModel, law: LearnedLaw | None = None):
+def film_um(experiment, model, law=None) -> np.ndarray:
     """(P,) film at the readings, ray by ray, with a law in the model or none."""
     points, path = experiment.measured_points, experiment.path
     if law is None:
@@ -221,7 +217,7 @@ def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():
 KNOTS, FILM_UM, NOISE_UM = 12, 30.0, 0.6
 
 
-def fitted(law: smooth_laws.RandomLaw, truth: np.ndarray, random: np.random.Generator) -> Fit:
+def fitted(law: smooth_laws.RandomLaw, truth: np.ndarray, random: np.random.Generator):
     """The fit of readings of a true curve (K,), the level of all film being unknown, too."""
     jacobian = np.zeros((len(law.basis.film_um), len(PARAMETERS)))
     jacobian[:, 0] = FILM_UM / NOISE_UM

@@ -15,7 +15,6 @@ from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import percent
-from paint_deposition.inference.readings.campaign import Experiment
 from small_campaign import small_campaign
 
 pytestmark = pytest.mark.slow
@@ -29,7 +28,7 @@ def shielded(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
-def clean(tmp_path_factory) -> Experiment:
+def clean(tmp_path_factory):
     """A door painted as the model says, all readings in one group."""
     options = DOOR | {'seed': 3, 'truth': None}
     (one,) = small_campaign(tmp_path_factory.mktemp('clean'), **options).experiments

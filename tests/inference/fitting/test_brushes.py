@@ -17,7 +17,6 @@ from paint_deposition.inference.fitting.calibration import brush_figures
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.inference.fitting.posterior import of_brushes, with_brushes_of
-from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PATTERN, Brush, PlanarPattern
 
 PHI_RAD = 0.1
@@ -37,7 +36,7 @@ TRUTH = pd.DepositionModel(
 VECTOR = PatternVector((1, 4))
 
 
-def painted(name: str, heights_m, brushes, seed=0) -> Experiment:
+def painted(name: str, heights_m, brushes, seed=0):
     """A panel with a pass of each of these brushes, measured as far as they reach."""
     motion = replace(passes(heights_m, samples=300), trigger_brush=np.repeat(brushes, 2))
     reached = column(min(heights_m) - 0.35, max(heights_m) + 0.35, 30)

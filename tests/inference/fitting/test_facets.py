@@ -10,7 +10,6 @@ from booth import MODEL, painted, path_of, serpentine
 from inference.fitting.panels import reading
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.random_effects import amounts
-from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from surfaces import triangulated
 
@@ -41,7 +40,7 @@ def measured(edge_m: float, sigma_um: float = 0.1, count: int = 120, seed: int =
     return Experiment.of('fold', fold(edge_m), PATH, readings)
 
 
-def study(edge_m: float) -> Study:
+def study(edge_m: float):
     return clean_and_fit(pd.Campaign((measured(edge_m),)), MODEL)[0]
 
 

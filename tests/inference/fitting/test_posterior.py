@@ -15,7 +15,6 @@ from paint_deposition.inference.fitting import posterior as jobs
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.posterior import PatternShift, draw_models, posterior_of
-from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import EFFECT_BETWEEN_JOBS, PATTERN
 
 WITH_EFFECT = FreeParameters.of(pd.DepositionModel(), CornerSlowdown(gain=0.5, length_m=0.2))
@@ -27,7 +26,7 @@ def campaign() -> pd.Campaign:
     return pd.Campaign((painted_by(pd.DepositionModel(), passes([1.0]), grid),))
 
 
-def thicker(panel: Experiment, **settings) -> pd.Campaign:
+def thicker(panel, **settings) -> pd.Campaign:
     """Another job, painted at other settings."""
     taken = replace(panel.taken, thickness_um=panel.taken.thickness_um + 0.01)
     return pd.Campaign((replace(panel, taken=taken, settings=settings),))
