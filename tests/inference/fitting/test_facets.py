@@ -11,7 +11,7 @@ from inference.fitting.panels import reading
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.random_effects import amounts
 from paint_deposition.inference.readings.campaign import Experiment
-from surfaces import triangulated
+from surfaces import refined
 
 RADIUS_M, HALF_M, COARSE_M, FINE_M = 0.15, 0.1, 0.05, 0.004
 PATH = path_of(serpentine((0.06, -0.04), opens_at_m=0.3, period_s=0.05))
@@ -23,7 +23,7 @@ def fold(edge_m: float) -> pd.Surface:
     def depth(x, z):
         return RADIUS_M - np.sqrt(RADIUS_M**2 - np.maximum(z, 0.0) ** 2)
 
-    return pd.Surface.from_triangles(*triangulated(depth, edge_m, HALF_M, jitter=0.2), 0.008)
+    return refined(depth, edge_m, 0.008, half_width_m=HALF_M, jitter=0.2)
 
 
 def measured(edge_m: float, sigma_um: float = 0.1, count: int = 120, seed: int = 3) -> Experiment:
