@@ -26,9 +26,9 @@ def test_the_keys_of_files_are_as_the_code_has_them(monkeypatch):
 
 
 @every_page
-def test_links_lead_to_files_and_headings(page: Path):
-    broken = []
-    for target in re.findall(r'\]\((?!https?:)([^)\s]*)\)', page.read_text(encoding='utf-8')):
+def test_links_files_and_targets_of_make_that_a_page_names_are_there(page: Path):
+    text, broken = page.read_text(encoding='utf-8'), []
+    for target in re.findall(r'\]\((?!https?:)([^)\s]*)\)', text):
         # A badge leads to the runs of a workflow.
         target = re.sub(r'^\.\./\.\./actions/workflows/([^/]*).*', r'.github/workflows/\1', target)
         name, _, heading = target.partition('#')
@@ -36,14 +36,10 @@ def test_links_lead_to_files_and_headings(page: Path):
         if not linked.exists() or (heading and heading not in headings(linked)):
             broken.append(target)
     assert not broken
-
-
-@every_page
-def test_files_and_targets_of_make_that_are_named_are_there(page: Path):
     folders = [folder for folder in (PACKAGE, SHARE, ROOT) if folder.is_dir()]
     known = {entry.name for folder in folders for entry in folder.iterdir() if entry.is_dir()}
     known -= {'build', 'install', 'runs', 'results'}
-    text = re.sub(r'```.*?```', '', page.read_text(encoding='utf-8'), flags=re.DOTALL)
+    text = re.sub(r'```.*?```', '', text, flags=re.DOTALL)
     named = [
         path for path in re.findall(r'`([\w.-]+/[\w./-]*)`', text) if path.split('/')[0] in known
     ]

@@ -1,6 +1,8 @@
 """The diagnosis of small campaigns of the virtual paint shop, whose defects are known."""
 
 import json
+import os
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +17,10 @@ from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import percent
-from small_campaign import small_campaign
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from small_campaign import generated, small_campaign
+from virtual_paint_shop.draw import stream
+from virtual_paint_shop.gauge import GaugeNoise, measure
 
 pytestmark = pytest.mark.slow
 BASE, SHIELDING = pd.DepositionModel(), EFFECTS['faraday_shielding']
@@ -193,3 +198,37 @@ def test_a_stripe_on_parts_painted_alike_is_unknown_with_its_place():
         most = max(rmse_um[f'holdout_{when}'], rmse_um['noise_floor'])
         assert square == pytest.approx(most**2)
     assert rmse_um['holdout_after'] < rmse_um['holdout_before']
+
+
+PARTS, A_DAY, READINGS, TURNS = 40, 10, 36, 6
+GREATEST = 0.8
+MANY = {
+    'seed': 3, 'truth': 'faraday_shielding', 'amplitude': GREATEST, 'experiments': ('door',),
+    'readings': READINGS, 'repeats': 0, 'heldout': 1, 'style': 'random', 'parcels': 2_000_000,
+    'mesh_edge_m': 0.03,
+}  # fmt: skip
+
+
+@pytest.mark.skipif('PAINT_LONG' not in os.environ, reason='over a minute: make many')
+def test_an_effect_that_grows_over_each_day_is_named_with_its_mean(tmp_path):
+    """Forty parts over four days, alike but for it."""
+    (door,) = small_campaign(tmp_path, **MANY).experiments
+    painted = generated(**MANY)
+    shown = painted.experiments[0].readings
+    parts = []
+    for row in range(PARTS):
+        share = row % A_DAY / (A_DAY - 1)
+        film_um = shown.clean_um + share * (shown.expected_um - shown.clean_um)
+        noise = GaugeNoise(level=0.015)
+        read_um, *_ = measure(shown.point, film_um, film_um, noise, stream(row, 80))
+        taken = reading(door, read_um).readings
+        taken = taken.select(np.arange(READINGS) % TURNS == row % TURNS)
+        parts.append(replace(door.with_readings(taken), name=f'part {row}'))
+    pattern = painted.truth['pattern']
+    planar = PlanarPattern(**{name: pattern[name] for name in PlanarPattern.model_fields})
+    start = time.process_time()
+    found = diagnose(pd.Campaign(tuple(parts)), pd.DepositionModel(planar=planar), EFFECTS)
+    assert time.process_time() - start < 120.0  # of one core, on any machine
+    assert found.accepted == ('faraday_shielding',)
+    shielding = found.classes[0].parameters['shielding']
+    assert shielding.low < GREATEST / 2 < shielding.high
