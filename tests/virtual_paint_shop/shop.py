@@ -40,7 +40,6 @@ class Experiment:
 class Campaign:
     """Experiments with one bell and one hidden truth."""
 
-    seed: int
     pattern: Pattern
     experiments: tuple[Experiment, ...]
     truth: dict
@@ -199,4 +198,4 @@ def _campaign(
         'hidden': [t.as_dict() for t in truths], 'pattern': asdict(pattern),
         'brushes': {number: asdict(each) for number, each in brushes.items()},
     }  # fmt: skip
-    return Campaign(seed, pattern, tuple(painted), plain(truth))
+    return Campaign(pattern, tuple(painted), plain(truth))

@@ -125,9 +125,6 @@ def test_shifted_deviations_are_weighed_as_if_they_were_there(columns, side):
     np.testing.assert_allclose(principal.log_bayes_factors(draws, SIZES, 8.0, shifts), expected)
 
 
-LAWS = [law for name, law in LEARNED.items() if name != 'speed_m_per_s']
-
-
 @pytest.fixture(scope='module')
 def study():
     return study_of(on_door(count=12))
@@ -144,7 +141,8 @@ def film_um(experiment, model, law=None) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ('law', 'kind'), [(law, kind) for law in LAWS for kind in law.kinds],
+    ('law', 'kind'),
+    [(law, k) for name, law in LEARNED.items() if name != 'speed_m_per_s' for k in law.kinds],
     ids=lambda value: value if isinstance(value, str) else value.covariate,
 )  # fmt: skip
 def test_a_random_law_changes_the_readings_as_the_law_in_the_model_does(law, kind, study):
