@@ -96,10 +96,6 @@ def test_geometry_and_gauge_have_no_law_that_could_be_off(study, effect):
     assert not errors(study, type(EDGE)()).any()
 
 
-def test_an_own_effect_may_name_any_covariate_and_no_other(study):
-    assert set(COVARIATES) == set(study.rays(MODEL)[0].along)
-
-
 def test_a_law_that_may_have_any_form_is_off_by_a_share_of_its_largest_effect(study):
     """Where it does least as much as where it does most: the law itself may be elsewhere."""
     change = change_um(study, EDGE)
@@ -156,6 +152,8 @@ def test_the_correction_of_a_law_acts_where_its_effect_does(doors):
 
 def test_laws_of_any_form_leave_the_film_as_a_whole_as_it_is(study):
     """How much paint there is in all is the pattern's."""
+    # An effect of one's own may name any covariate of the readings, and no other.
+    assert set(COVARIATES) == set(study.rays(MODEL)[0].along)
     fit = study.fit(FreeParameters.of(MODEL))
     laws = explanations.nonparametric_laws_of(study, MODEL)
     for found in (laws, explanations.of_footprint(study, fit)):

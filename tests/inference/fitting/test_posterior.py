@@ -119,7 +119,7 @@ def known(means: dict[str, float], deviations: dict[str, float]) -> Posterior:
     return Posterior(mean=centres, covariance=dict(zip(centres, rows.tolist(), strict=True)))
 
 
-def test_draws_near_a_bound_follow_the_truncated_normal():
+def test_draws_near_a_bound_follow_the_truncated_normal_and_none_is_beyond():
     """The mean of what is left of the normal, not that of one whose tail lies at the bound."""
     posterior = known({'K2': 0.05, GAIN: 0.1}, {'K2': 0.1, GAIN: 0.3})
     models = draw_models(MODEL, posterior, COUNT, seed=1)
@@ -131,9 +131,7 @@ def test_draws_near_a_bound_follow_the_truncated_normal():
         assert len(np.unique(values)) == COUNT
         assert values.mean() == pytest.approx(told.mean(), abs=4.0 * told.std() / COUNT**0.5)
         assert values.std() == pytest.approx(told.std(), rel=4.0 / (2 * COUNT) ** 0.5)
-
-
-def test_a_draw_is_within_its_bounds_or_refused():
+    # Each is within its bounds, or refused.
     wide = known({'K3_cos_phi': 0.7}, {'K3_cos_phi': 0.3, 'K3_sin_phi': 0.6})
     asymmetry = np.array([model.planar.K3 for model in draw_models(MODEL, wide, COUNT, seed=2)])
     assert len(np.unique(asymmetry)) == COUNT
