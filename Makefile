@@ -52,7 +52,7 @@ soak: build  ## run a cell for half an hour; ARGS='--minutes 10 --rate 750' for 
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page soak $(ARGS)
 
 many: build  ## diagnose 40 parts of several days, a minute
-	@$(IN_ENVIRONMENT) PAINT_LONG=1 pytest tests/inference/diagnosis/test_many_parts.py $(ARGS)
+	@$(IN_ENVIRONMENT) PAINT_LONG=1 pytest tests/inference/diagnosis/test_procedure.py -k each_day $(ARGS)
 
 numbers: build  ## try 10,000 random parts, paths and models; ARGS goes to pytest
 	@$(IN_ENVIRONMENT) PAINT_EXAMPLES=$${PAINT_EXAMPLES:-10000} pytest tests/film/test_random_paints.py --timeout 0 -o faulthandler_timeout=0 $(ARGS)

@@ -36,7 +36,6 @@ HIDDEN = (
     'tcp_tilt+gauge_curvature_bias',
 )  # fmt: skip
 SCALE = 2.5
-OFFSET_M = 0.05
 NOISE = GaugeNoise(floor_um=0.5, relative=0.005, texture=0.008)
 PANEL_READINGS, READINGS, ORACLE_READINGS, JUDGED = 60, 60, 300, 600
 TURNS = 2
@@ -61,7 +60,7 @@ class World:
             seed, hidden, experiments=('panel',), readings=PANEL_READINGS, repeats=0, heldout=1,
             noise=NOISE, scale=SCALE, parcels=parcels,
         )  # fmt: skip
-        pattern, jobs = draw_jobs(seed, truths, ('panel', 'door'), OFFSET_M, 'outside')
+        pattern, jobs = draw_jobs(seed, truths, ('panel', 'door'), 'outside')
         return World(seed, truths, panel, pattern, jobs[1].part, parcels, folder)
 
     def painted(self, name: str, trajectory: Trajectory, turn: int) -> Painted:

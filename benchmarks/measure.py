@@ -62,7 +62,7 @@ class Door:
     @staticmethod
     def of(seed: int) -> 'Door':
         """The door, the gun's path and the bell of this seed."""
-        pattern, (job,) = draw_jobs(seed, [], ('door',), 0.05, None)
+        pattern, (job,) = draw_jobs(seed, [], ('door',))
         surface = Surface.from_triangles(*job.part.mesh(EDGE_M), EDGE_M)
         log = record(job.motion, job.plan.sample_s, stream(seed, 30))
         motion = Trajectory(
@@ -129,9 +129,9 @@ def diagnosed(door_truth_and_count: tuple[int, str, int]) -> dict:
         truths = choose_truths(truth, stream(seed, 1), None, SCALE)
         film_um, expected_um = here.bench.readings(truths, at[:, 0], at[:, 2])
         rng = np.random.default_rng([seed, len(truth)])
-        session = measure(np.arange(count), film_um, expected_um, NOISE, rng)
+        read_um, *_ = measure(np.arange(count), film_um, expected_um, NOISE, rng)
         readings = Readings.of(
-            at, session.thickness_um, sigma_um=NOISE.sigma_um(expected_um),
+            at, read_um, sigma_um=NOISE.sigma_um(expected_um),
             normals=here.part.surface.normals[rows],
         )  # fmt: skip
         part = Experiment.of('door', here.part.surface, here.part.path, readings)

@@ -30,7 +30,6 @@ NOISE = GaugeNoise(floor_um=0.5, relative=0.005)
 READINGS, JUDGED = 60, 400
 TARGET_UM = 20
 # The gun of the shop stands this far before the model plane's origin.
-OFFSET_M = 0.05
 
 Paint = Callable[..., str]
 
@@ -45,7 +44,7 @@ def level(folder: Path, paint: Paint, say: Callable[[str], None]) -> Path:
     """
     folder = folder / 'even_door'
     truths = choose(HIDDEN, stream(SEED, 1), None, SCALE)
-    pattern, (_, job) = draw_jobs(SEED, truths, ('panel', 'door'), OFFSET_M, 'outside')
+    pattern, (_, job) = draw_jobs(SEED, truths, ('panel', 'door'), 'outside')
     panel = generate(SEED, HIDDEN, experiments=('panel',), readings=READINGS, repeats=0,
                      heldout=1, noise=NOISE, scale=SCALE, parcels=PARCELS)  # fmt: skip
     judged = scatter(job.part, JUDGED, stream(SEED, 90), 0.0)

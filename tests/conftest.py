@@ -1,13 +1,14 @@
 """Fixtures that every test may use: shared data, a DDS domain of its own, nodes that spin."""
 
 import os
-import time
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
 import hypothesis
 import pytest
+
+from waiting import until
 
 # As the command does, before NumPy is loaded: see cli/main.py.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
@@ -48,10 +49,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if 'ros_domain' in item.fixturenames:
             item.add_marker('slow')
-    rooms = [item.path.relative_to(REPOSITORY / 'tests').parts[0] for item in items]
     first = {room: place for place, room in enumerate(LONGEST)}
-    order = sorted(range(len(items)), key=lambda row: first.get(rooms[row], len(first)))
-    items[:] = [items[row] for row in order]
+    tests = REPOSITORY / 'tests'
+    items.sort(key=lambda item: first.get(item.path.relative_to(tests).parts[0], len(first)))
 
 
 @pytest.fixture(scope='session')
@@ -147,10 +147,6 @@ def wait_until(executor: object) -> Callable[..., None]:
     def wait_until(
         condition: Callable[[], object], what: str = 'the condition', timeout_s: float = 60.0
     ) -> None:
-        deadline = time.monotonic() + timeout_s
-        while not condition():
-            if time.monotonic() > deadline:
-                pytest.fail(f'{what} did not hold within {timeout_s} s')
-            executor.spin_once(timeout_sec=0.02)
+        until(condition, what, lambda: executor.spin_once(timeout_sec=0.02), timeout_s)
 
     return wait_until

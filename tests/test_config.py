@@ -1,22 +1,17 @@
 """The files in config/: examples that work as they stand."""
 
 import re
-from pathlib import Path
 
 import pytest
 import yaml
 
 import paint_deposition as pd
+from booth import SAMPLES
 from paint_deposition.files.campaign_file import _Band, _Entry, _File
 from paint_deposition.files.motion_files import MOTION_KINDS
 from paint_deposition.files.zones_file import ZoneEntry
 
-REQUIRED = ('x_m', 'y_m', 'z_m', 'thickness_um')
-OPTIONAL = ('point', 'group', 'layer', 'sigma_um', 'nx', 'ny', 'nz')
-REPOSITORY = Path(__file__).resolve().parent.parent
-CONFIG = REPOSITORY / 'config'
-PACKAGE = REPOSITORY / 'ros2_ws/src/paint_deposition'
-SAMPLES = PACKAGE / 'samples'
+CONFIG = SAMPLES.parents[3] / 'config'
 
 
 def test_model_is_the_default_one_and_readings_are_readings():
@@ -25,7 +20,8 @@ def test_model_is_the_default_one_and_readings_are_readings():
     assert len(readings) == 3
     assert len(set(readings.point)) == 2
     text = (CONFIG / 'readings.csv').read_text()
-    assert all(re.search(rf'\b{name}\b', text) for name in (*REQUIRED, *OPTIONAL))
+    columns = 'x_m y_m z_m thickness_um point group layer sigma_um nx ny nz'
+    assert all(re.search(rf'\b{name}\b', text) for name in columns.split())
 
 
 @pytest.mark.slow

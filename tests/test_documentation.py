@@ -1,4 +1,4 @@
-"""What the documentation names is there, and the rooms keep their order."""
+"""What the documentation names is there."""
 
 import re
 import shlex
@@ -8,7 +8,6 @@ from xml.etree import ElementTree
 
 import click
 import pytest
-from importlinter.cli import lint_imports
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARE = ROOT / 'ros2_ws/src/paint_deposition'
@@ -27,9 +26,9 @@ def test_the_keys_of_files_are_as_the_code_has_them(monkeypatch):
 
 
 @every_page
-def test_links_lead_to_files_and_headings(page: Path):
-    broken = []
-    for target in re.findall(r'\]\((?!https?:)([^)\s]*)\)', page.read_text(encoding='utf-8')):
+def test_links_files_and_targets_of_make_that_a_page_names_are_there(page: Path):
+    text, broken = page.read_text(encoding='utf-8'), []
+    for target in re.findall(r'\]\((?!https?:)([^)\s]*)\)', text):
         # A badge leads to the runs of a workflow.
         target = re.sub(r'^\.\./\.\./actions/workflows/([^/]*).*', r'.github/workflows/\1', target)
         name, _, heading = target.partition('#')
@@ -37,14 +36,10 @@ def test_links_lead_to_files_and_headings(page: Path):
         if not linked.exists() or (heading and heading not in headings(linked)):
             broken.append(target)
     assert not broken
-
-
-@every_page
-def test_files_and_targets_of_make_that_are_named_are_there(page: Path):
     folders = [folder for folder in (PACKAGE, SHARE, ROOT) if folder.is_dir()]
     known = {entry.name for folder in folders for entry in folder.iterdir() if entry.is_dir()}
     known -= {'build', 'install', 'runs', 'results'}
-    text = re.sub(r'```.*?```', '', page.read_text(encoding='utf-8'), flags=re.DOTALL)
+    text = re.sub(r'```.*?```', '', text, flags=re.DOTALL)
     named = [
         path for path in re.findall(r'`([\w.-]+/[\w./-]*)`', text) if path.split('/')[0] in known
     ]
@@ -59,7 +54,9 @@ def test_commands_that_are_shown_have_their_options(page: Path):
 
     context = click.Context(paint)
     unknown = []
-    for line in shown_commands(page):
+    blocks = re.findall(r'```bash\n(.*?)```', page.read_text(encoding='utf-8'), re.DOTALL)
+    lines = '\n'.join(blocks).replace('\\\n', ' ')
+    for line in re.findall(r'^(?:\./)?paint (.*)$', lines, re.MULTILINE):
         name, *words = shlex.split(line.replace('…', ''), comments=True)
         if name not in COMMANDS:
             unknown.append(name)
@@ -92,15 +89,3 @@ def headings(page: Path) -> set[str]:
     """Anchors of a page as GitHub makes them."""
     lines = re.findall(r'^#+ (.*)$', page.read_text(encoding='utf-8'), re.MULTILINE)
     return {re.sub(r'[^\w\- ]', '', line.lower()).replace(' ', '-') for line in lines}
-
-
-def shown_commands(page: Path) -> list[str]:
-    """Arguments of `paint` in the blocks of a page, each on one line."""
-    blocks = re.findall(r'```bash\n(.*?)```', page.read_text(encoding='utf-8'), re.DOTALL)
-    lines = '\n'.join(blocks).replace('\\\n', ' ')
-    return re.findall(r'^(?:\./)?paint (.*)$', lines, re.MULTILINE)
-
-
-def test_rooms_import_only_from_below(repository, monkeypatch):
-    monkeypatch.syspath_prepend(str(repository / 'ros2_ws/src/paint_deposition'))
-    assert lint_imports(config_filename=str(repository / 'pyproject.toml'), no_cache=True) == 0

@@ -32,15 +32,18 @@ def manifest(package: str) -> ElementTree.Element:
     return ElementTree.parse(SOURCES / package / 'package.xml').getroot()
 
 
+def class_of(node: str) -> type:
+    _, place, name = getattr(executables, node).args
+    return getattr(importlib.import_module(f'{PACKAGE}.nodes.{place}'), name)
+
+
 def table_of(node: str) -> dict:
     """The parameter table of the node's class, by name."""
-    _, place, node_class = getattr(executables, node).args
-    module = importlib.import_module(f'{PACKAGE}.nodes.{place}')
-    return getattr(module, node_class).PARAMETERS
+    return class_of(node).PARAMETERS
 
 
 @pytest.mark.filterwarnings('ignore::DeprecationWarning')
-def test_manifests_changelogs_and_licences_agree(repository):
+def test_manifests_changelogs_and_licences_agree_with_each_other_and_the_code(repository):
     """The changelogs of the packages are read as bloom reads them."""
     from catkin_pkg.changelog import get_changelog_from_path
 
@@ -60,14 +63,11 @@ def test_manifests_changelogs_and_licences_agree(repository):
     assert released[0] == version
     licence = (repository / 'LICENSE').read_bytes()
     assert (SOURCES / PACKAGE / 'LICENSE').read_bytes() == licence
-
-
-def test_manifest_names_every_message_package_in_use():
+    # The manifest names every message package in use.
     used = set()
     for path in (SOURCES / PACKAGE / PACKAGE).rglob('*.py'):
         used |= set(re.findall(r'^\s*from (\w+)\.(?:msg|srv) import', path.read_text(), re.M))
-    declared = {tag.text for tag in manifest(PACKAGE).iter('depend')}
-    assert used <= declared
+    assert used <= {tag.text for tag in xml.iter('depend')}
 
 
 def test_what_is_installed_is_where_ros2_looks(repository):
@@ -128,7 +128,7 @@ def launched(*arguments: str) -> str:
     return done.stdout + done.stderr
 
 
-def test_launch_file_describes_every_node():
+def test_launch_file_describes_every_node_and_leaves_the_rest_to_a_file_of_ones_own(tmp_path):
     given = {'record': 'runs', 'measurements': 'readings.csv', 'urdf': 'arm.urdf', 'page': 'true'}
     nodes = wanted(bag='run', rate='2', publish_clock='false', **given) | wanted(**given)
     assert set(nodes) == set(NODES) - {'egm_source', 'opcua_source', 'rws_source'}
@@ -136,17 +136,12 @@ def test_launch_file_describes_every_node():
         assert set(parameters) <= set(table_of(node))
     assert set(wanted()) == {'deposition_simulator', 'index_planner'}
     assert wanted(trigger='/gun')['atomizer_source'] == {'trigger': '/gun'}
-
-
-def test_launch_leaves_what_is_not_given_to_a_parameter_file_of_ones_own(tmp_path):
     own = tmp_path / 'own.yaml'
     own.write_text('')
     nodes = wanted(parameters=str(own), bag='run', page='true')
     assert nodes.pop('bag_player') == {'bag': 'run', 'wait_for_subscribers': 2}
     assert nodes == {'deposition_simulator': {}, 'index_planner': {}, 'web_view': {}}
-
-
-def test_launch_takes_the_robot_of_a_bag_from_the_bag():
+    # The robot of a bag is taken from the bag.
     for given, told in (
         ({'urdf': 'arm.urdf'}, {'urdf': 'arm.urdf'}),
         ({'base_frame': 'world'}, {'tf': ['world', 'tool0']}),
@@ -154,20 +149,15 @@ def test_launch_takes_the_robot_of_a_bag_from_the_bag():
         nodes = wanted(bag='run', **given)
         assert 'atomizer_source' not in nodes
         assert told.items() <= nodes['bag_player'].items()
-
-
-@pytest.mark.parametrize(
-    ('given', 'count'),
-    [
+    # A replay waits for every node that takes poses.
+    for given, count in (
         ({}, 1),
         ({'record': 'runs'}, 2),
         ({'measurements': "painter's.csv"}, 2),
         ({'record': '1', 'measurements': 'readings.csv', 'page': 'true'}, 4),
         ({'wait_for_subscribers': '5'}, 5),
-    ],
-)
-def test_launched_replay_waits_for_every_node_that_takes_poses(given, count):
-    assert wanted(bag='run', **given)['bag_player']['wait_for_subscribers'] == count
+    ):
+        assert wanted(bag='run', **given)['bag_player']['wait_for_subscribers'] == count
 
 
 @pytest.mark.slow

@@ -7,35 +7,26 @@ from rclpy.action import get_action_server_names_and_types_by_node
 
 from booth import SAMPLES
 from nodes.cell import parameters
-from paint_deposition.nodes.atomizer_source import AtomizerSource
-from paint_deposition.nodes.bags.bag_player import BagPlayer
 from paint_deposition.nodes.bags.recorded_topic import default_topics
-from paint_deposition.nodes.bags.run_recorder import RunRecorder
-from paint_deposition.nodes.controllers import OpcuaSource, RwsSource
-from paint_deposition.nodes.egm_source import EgmSource
-from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.managed_node import ManagedNode
-from paint_deposition.nodes.model_comparison import ModelComparison
-from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.web_view import WebView
 from robot_arm import URDF
+from test_packaging import class_of
 
 PANEL = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
 PLACE = {'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], 'part_parent_frame': 'base'}
+READINGS = {'measurements_file': str(SAMPLES / 'panel_study/panel_577.csv')}
+# What each node is told.
 NODES = {
-    'deposition_simulator': (DepositionSimulator, PANEL | PLACE),
-    'model_comparison': (
-        ModelComparison,
-        PANEL | PLACE | {'measurements_file': str(SAMPLES / 'panel_study/panel_577.csv')},
-    ),
-    'index_planner': (IndexPlanner, PANEL),
-    'bag_player': (BagPlayer, {'bag': str(SAMPLES / 'door_horizontal'), 'start_paused': True}),
-    'atomizer_source': (AtomizerSource, {}),
-    'egm_source': (EgmSource, {'port': 16510}),
-    'opcua_source': (OpcuaSource, {'trigger': 'i=1', 'url': 'opc.tcp://127.0.0.1:9'}),
-    'rws_source': (RwsSource, {'trigger': 'doGun', 'url': 'http://127.0.0.1:9'}),
-    'run_recorder': (RunRecorder, {'name': 'run'}),
-    'web_view': (WebView, PANEL | {'port': 0}),
+    'deposition_simulator': PANEL | PLACE,
+    'model_comparison': PANEL | PLACE | READINGS,
+    'index_planner': PANEL,
+    'bag_player': {'bag': str(SAMPLES / 'door_horizontal'), 'start_paused': True},
+    'atomizer_source': {'urdf_file': str(URDF)},
+    'egm_source': {'port': 16510},
+    'opcua_source': {'trigger': 'i=1', 'url': 'opc.tcp://127.0.0.1:9'},
+    'rws_source': {'trigger': 'doGun', 'url': 'http://127.0.0.1:9'},
+    'run_recorder': {'name': 'run'},
+    'web_view': PANEL | {'port': 0},
 }
 # Where tf2 is installed, and with use_sim_time.
 NOT_ALWAYS = {'/tf', '/tf_static', '/clock'}
@@ -58,12 +49,10 @@ def allowed(repository, node: str) -> dict[str, set[str]]:
 
 @pytest.mark.parametrize('name', NODES)
 def test_policies_fit_the_nodes(repository, ros_context, executor, wait_until, tmp_path, name):
-    node_class, values = NODES[name]
+    values = NODES[name]
     if name == 'run_recorder':
         values = values | {'output_directory': str(tmp_path)}
-    if name == 'atomizer_source':
-        values = values | {'urdf_file': str(URDF)}
-    node = node_class(context=ros_context, parameter_overrides=parameters(**values))
+    node = class_of(name)(context=ros_context, parameter_overrides=parameters(**values))
     executor.add_node(node)
     rules = allowed(repository, name)
     published = {publisher.topic_name for publisher in node.publishers} | OF_ALL

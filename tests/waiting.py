@@ -3,12 +3,13 @@
 import time
 from collections.abc import Callable
 
-PATIENCE_S = 60.0
 
-
-def until(condition: Callable[[], object], what: str) -> None:
-    """Return once it holds, which must be within a minute."""
-    deadline = time.monotonic() + PATIENCE_S
+def until(
+    condition: Callable[[], object], what: str,
+    meanwhile: Callable[[], None] = lambda: time.sleep(0.02), timeout_s: float = 60.0,
+) -> None:  # fmt: skip
+    """Return once it holds, which must be within a minute or the time that is given."""
+    deadline = time.monotonic() + timeout_s
     while not condition():
-        assert time.monotonic() < deadline, f'{what} did not come within {PATIENCE_S:.0f} s'
-        time.sleep(0.02)
+        assert time.monotonic() < deadline, f'{what} did not come within {timeout_s:.0f} s'
+        meanwhile()

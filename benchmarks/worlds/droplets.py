@@ -31,7 +31,6 @@ LAYOUTS = (('panel', 'door'), ('door',), ('panel', 'door', 'door_vertical'))
 LAYOUT_SHARES = (0.5, 0.25, 0.25)
 # Not seen at all beside the pattern, or only on a few points: no partners for a pair.
 ALONE = ('level', 'time', 'visibility')
-OFFSET_M = 0.05
 # Scatter of the film by the number of droplets traced, a share.
 TRACED = 0.004
 # Standard deviations of what a judge takes as free in a pattern; of lengths and volumes a share.
@@ -162,7 +161,7 @@ def paint(
     painted = _painted(case, parcels)
     rng, amplitudes = stream(case.seed, 61), dict(zip(case.truths, case.amplitudes, strict=True))
     truths = choose(list(case.truths), stream(case.seed, 1), amplitudes)
-    pattern, jobs = draw_jobs(case.seed, truths, case.layout, OFFSET_M, None)
+    pattern, jobs = draw_jobs(case.seed, truths, case.layout)
     parts, judged = zip(*(
         _measured(case, experiment, pattern, job, rng)
         for experiment, job in zip(painted.experiments, jobs, strict=True)
@@ -186,14 +185,14 @@ def _measured(
 ) -> tuple[Part, Judged]:
     """The part as read in one session, and what the judge needs of its points."""
     noise, table, unseen = case.noise, experiment.readings, experiment.heldout
-    session = measure(table.point, table.film_um, table.expected_um, noise, rng)
+    read_um, level, zero_um = measure(table.point, table.film_um, table.expected_um, noise, rng)
     log, texture = experiment.log, np.hypot(noise.texture, TRACED)
     part = Part(
         experiment.name, experiment.vertices_m, experiment.faces, log.stamps_ns, log.positions_m,
         log.quaternions_xyzw, log.trigger_stamps_ns, log.trigger_on, table.positions_m,
-        table.point, session.thickness_um, table.sigma_um if case.stated else None,
+        table.point, read_um, table.sigma_um if case.stated else None,
         unseen.positions_m,
-        unseen.film_um * (session.level - 1.0) + unseen.expected_um + session.offset_um,
+        unseen.film_um * (level - 1.0) + unseen.expected_um + zero_um,
         np.hypot(noise.sigma_um(unseen.expected_um), texture * unseen.film_um),
     )  # fmt: skip
     _, first, count = np.unique(table.point, return_index=True, return_counts=True)

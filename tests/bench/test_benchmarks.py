@@ -47,15 +47,11 @@ def test_every_place_has_a_benchmark_that_fills_it(tmp_path):
         page_of('a', tmp_path)
 
 
-def recorded(task):
-    return [{'task': task}]
-
-
 def test_tasks_run_as_the_cases_of_a_sweep_and_join_the_kept_records(tmp_path, monkeypatch):
     monkeypatch.setattr('benchmarks.records.workers', lambda: ThreadPoolExecutor(1))
     results = tmp_path / 'results.jsonl'
     results.write_text('{"task": [0]}\n')
-    records = add(results, recorded, [(1,), (2,), (2,)])
+    records = add(results, lambda task: [{'task': task}], [(1,), (2,), (2,)])
     assert sorted(record['task'] for record in records) == [[0], [1], [2]]
 
 
@@ -97,12 +93,6 @@ def found(rows, label):
     return [value for _, value in row.values]
 
 
-def test_groups_are_those_accepted_and_no_learned_laws():
-    assert scores.groups(RIGHT) == [{'edge_build', 'corner_slowdown'}]
-    assert scores.groups(LISTED) == scores.wrong(RIGHT) == []
-    assert scores.groups(WRONG) == scores.wrong(WRONG) == [{'sag'}]
-
-
 def test_naming_counts_strong_effects_and_a_pair_where_both_are_strong():
     rows = scores.naming([RIGHT, LISTED, WRONG, BLAMED, result('e', strength=3.0)])
     assert found(rows, 'effect in the group named, over 8 sd') == [True, False, False]
@@ -117,7 +107,8 @@ def test_naming_counts_strong_effects_and_a_pair_where_both_are_strong():
     assert found(rows, 'at least one') == [True, True]
 
 
-def test_mistakes_are_counted_per_campaign():
+def test_mistakes_are_counted_per_campaign_and_learned_laws_are_none():
+    assert scores.groups(RIGHT) == [{'edge_build', 'corner_slowdown'}]
     rows = scores.mistakes([RIGHT, LISTED, WRONG, BLAMED])
     assert found(rows, 'wrong effects accepted, per campaign') == [0, 0, 1, 1]
     assert found(rows, 'unknown cause blamed on an effect') == [True]
@@ -152,10 +143,7 @@ def test_an_interval_covers_as_often_as_it_says():
         low, high = scores.interval(values)
         hits += low <= 0.5 <= high
     assert hits / 50 >= 0.86
-
-
-def test_never_is_not_known_from_few_campaigns():
-    """Zero of three campaigns, however often redrawn: up to 1 - 0.025^(1/3)."""
+    # Zero of three campaigns, however often redrawn: up to 1 - 0.025^(1/3).
     values = [(str(k % 3), 0.0) for k in range(60)]
     assert scores.interval(values) == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 3)))
     assert 'none' in str(scores.Row('nothing', []))

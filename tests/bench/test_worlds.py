@@ -20,19 +20,15 @@ projection: {{model_plane_m: 0.3, emission_offset_m: 0.05}}
 measured = pytest.mark.skipif(not available(), reason='measurements kept beside the repository')
 
 
-def gaussian():
-    """A pattern of one Gaussian, for which eq. (1) is exact."""
-    line = np.linspace(-semi_real.HALF_M, semi_real.HALF_M, semi_real.GRID)
-    u, v = np.meshgrid(line, line)
-    table = np.exp(-(u**2 + v**2) / (2 * WIDTH_M**2)) / (2 * np.pi * WIDTH_M**2)
-    return {'pattern': semi_real.Pattern(table, FLOW, 0.1, 2.5 * WIDTH_M)}
-
-
 @pytest.mark.slow
 @measured
 def test_with_nothing_hidden_the_film_follows_eq_2(tmp_path):
-    """Up to each part's own level and its gauge's zero."""
-    painted = semi_real.paint(2, 'clean', **gaussian())
+    """Up to each part's own level and its gauge's zero. Of one Gaussian eq. (1) is exact."""
+    line = np.linspace(-semi_real.HALF_M, semi_real.HALF_M, semi_real.GRID)
+    u, v = np.meshgrid(line, line)
+    table = np.exp(-(u**2 + v**2) / (2 * WIDTH_M**2)) / (2 * np.pi * WIDTH_M**2)
+    pattern = semi_real.Pattern(table, FLOW, 0.1, 2.5 * WIDTH_M)
+    painted = semi_real.paint(2, 'clean', pattern=pattern)
     folder = painted.write(tmp_path / 'campaign').parent
     (tmp_path / 'model.yaml').write_text(MODEL)
     for part in painted.parts:

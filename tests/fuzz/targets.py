@@ -5,7 +5,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from io import BytesIO
 from pathlib import Path
 
@@ -32,42 +32,16 @@ GAUGE_JSON = (
     b'{"unit": "um", "results": [{"x_m": 0, "y_m": 0, "z_m": 0, "thickness_um": 20, "id": "a"}, '
     b'{"x_m": 0, "y_m": 0, "z_m": 1, "thickness_um": 21.5, "id": null}]}'
 )
+# What none of the programs under tests/files has.
 RAPID = rb"""MODULE Door
-  PERS wobjdata wobjDoor:=[FALSE,TRUE,"",[[900,0,600],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
   CONST robtarget p1:=[[0,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
-  VAR robtarget p2;
-  VAR triggdata gunOn;
-  VAR num n{2}:=[1,2];
   PROC main()
-    TriggIO gunOn,0\Start\DOp:=doGun,1;
-    p2:=Offs(p1,0,0,100*(1+2));
-    MoveJ p1,vmax,z10,tBell\WObj:=wobjDoor;
-    TriggL RelTool(p2,0,10,0),v500,gunOn,fine,tBell\WObj:=wobjDoor;
-    MoveC p1,p2,v100\V:=200,z50,tBell;
     MoveLDO p1,v50,z1,tBell,doGun,0;
-    SetBrush 3;
-    PaintL p1,v200\T:=2,fine,tBell;
-    IF n{1}=2 THEN
-      WaitTime 1;
-    ENDIF
     FOR i FROM 1 TO 3 STEP 2 DO
-      rStroke i\brush:=Round(i/2);
+      MoveC Offs(p1,0,Round(i/2),0),Offs(p1,i,9,0),v100\V:=200,z50,tBell;
     ENDFOR
-    WHILE n{2}<3 AND NOT TestDI(di1) OR n{2}=2 DO
-      Incr n{2};
-    ENDWHILE
+    IF NOT TestDI(di1) OR FALSE TPWrite "x";
   ENDPROC
-  PROC rStroke(INOUT num i \num brush)
-    VelSet 50,800;
-    TEST i
-    CASE 1,2: SetBrush brush\X:=-10;
-    DEFAULT: p2.trans.x:=f(i);
-    ENDTEST
-    PaintL p2,v500,z10,tBell\WObj:=wobjDoor;
-  ENDPROC
-  FUNC num f(num i)
-    RETURN i mod 2;
-  ENDFUNC
 ENDMODULE
 """
 ZONES = b"""zones:
@@ -81,28 +55,17 @@ trajectory: panel_577
 grid: {K2: [0.1, 0.2], speed_factor: {from: 0.5, to: 1.5, steps: 3}}
 sample: {count: 3, seed: 1, vary: {K3: [0.1, 0.2]}}
 """
-POSES = (
-    b'time_s,x_mm,y_mm,z_mm,qx,qy,qz,qw,spraying\n0,0,0,0,0,0,0,1,1\n0.1,10,0,0,0,0,0,1,0\n',
-    b't;x [m];y [m];z [m];rx [deg];ry [deg];rz [deg]\n0;0;0;0;0;0;0\n0,1;0,01;0;0;0;0;90\n',
-)
 
 
 @dataclass(frozen=True)
 class Target:
-    """A reader under test.
+    """A reader under test."""
 
-    Attributes:
-        suffix: of the file.
-        read: the reader; what it may raise is PaintError.
-        seeds: files as they should be.
-        words: what is worth inserting.
-        around: the file that holds the bytes as its changing part, for compressed formats.
-    """
-
-    suffix: str
-    read: Callable[[Path], object]
-    seeds: list[bytes]
-    words: str = ''
+    suffix: str  # of the file
+    read: Callable[[Path], object]  # what it may raise is PaintError
+    seeds: list[bytes]  # files as they should be
+    words: str = ''  # what is worth inserting
+    # The file that holds the bytes as its changing part, for compressed formats.
     around: Callable[[bytes], bytes] = field(default=lambda data: data)
 
 
@@ -116,22 +79,13 @@ def _box(kind: str, **options: str) -> bytes:
     return made.encode() if isinstance(made, str) else made
 
 
-def _in_zip(template: bytes, ends_with: str) -> Callable[[bytes], bytes]:
+def _in_zip(template: bytes, member: str, data: bytes) -> bytes:
     """The file with one of its members replaced by the bytes."""
-
-    def around(data: bytes) -> bytes:
-        made = BytesIO()
-        with zipfile.ZipFile(BytesIO(template)) as old, zipfile.ZipFile(made, 'w') as new:
-            for name in old.namelist():
-                new.writestr(name, data if name.endswith(ends_with) else old.read(name))
-        return made.getvalue()
-
-    return around
-
-
-def _member(package: bytes, ends_with: str) -> bytes:
-    with zipfile.ZipFile(BytesIO(package)) as opened:
-        return opened.read(next(n for n in opened.namelist() if n.endswith(ends_with)))
+    made = BytesIO()
+    with zipfile.ZipFile(BytesIO(template)) as old, zipfile.ZipFile(made, 'w') as new:
+        for name in old.namelist():
+            new.writestr(name, data if name == member else old.read(name))
+    return made.getvalue()
 
 
 def _written(write: Callable[[Path], object], name: str) -> bytes:
@@ -201,13 +155,17 @@ def targets() -> dict[str, Target]:
     cells = 'x_mm thickness_um mils [mm] ; \t " 1e308 nan - ,,'
     rows = [['x_m', 'y_m', 'z_m', 'thickness_um'], [0.1, 0.0, 0.2, 24.5], [0.2, 0.0, 0.2, 'n/a']]
     book = _written(lambda path: write_workbook(path, {'Readings': rows}), 'book.xlsx')
+    sheet = 'xl/sheet1.xml'
     ros1 = _written(lambda path: write_bag(path, _entries(True), 'ros1'), 'run.bag')
-    readings = [path.read_bytes() for path in sorted(LAYOUTS.glob('*.txt'))]
+    readings, poses, programs = (
+        [path.read_bytes() for path in sorted(LAYOUTS.parents[1].glob(names))]
+        for names in ('tables/layouts/*.txt', 'tables/poses/*.csv', 'rapid/programs/*.mod')
+    )
     model = (SAMPLES.parents[3] / 'config/model.yaml').read_bytes()
     campaign = (SAMPLES / 'measured_door/campaign.yaml').read_bytes()
     return {
         'rapid': Target(
-            '.mod', pd.read_recording, [RAPID],
+            '.mod', pd.read_recording, [RAPID, *programs],
             r'PROC ENDPROC MoveL MoveC PaintL TriggL SetDO SetAO Offs( RelTool( wobj0 [[ ]] := '
             '{1} .trans /0 not 9E9 - FOR WHILE TRUE DO ENDFOR IF TEST RETURN Incr UseBrushTab ,',
         ),
@@ -219,11 +177,11 @@ def targets() -> dict[str, Target]:
             '.csv', lambda path: read_list(path, Layout(), None), [points], cells
         ),
         'points': Target('.csv', read_points, [points], cells),
-        'poses': Target('.csv', pd.read_recording, [*POSES], cells),
+        'poses': Target('.csv', pd.read_recording, poses, cells),
         'workbook': Target('.xlsx', pd.read_readings, [book]),
         'worksheet': Target(
-            '.xlsx', pd.read_readings, [_member(book, 'sheet1.xml')],
-            '<c r="A1"> <v> </v> t="s" t="d" AAAAA99999999', _in_zip(book, 'sheet1.xml'),
+            '.xlsx', pd.read_readings, [zipfile.ZipFile(BytesIO(book)).read(sheet)],
+            '<c r="A1"> <v> </v> t="s" t="d" AAAAA99999999', partial(_in_zip, book, sheet),
         ),
         'stl': Target('.stl', _mesh, [_box('stl'), _box('stl_ascii')], 'solid facet vertex'),
         'ply': Target(

@@ -15,12 +15,9 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import trimesh
 import yaml
+from benchmarks.worlds.record import Part
 from scipy.spatial.transform import Rotation
-
-from virtual_paint_shop.files import write_bag
-from virtual_paint_shop.jobs import Log
 
 NOZZLES = ('E8003', 'PSERQ8004')
 HEIGHTS_IN = (20, 30, 40)
@@ -85,16 +82,20 @@ def spray_campaign(
     def told_m(height_in: float) -> float:
         return told_times * height_in * SCALE_M_PER_IN + told_off_m
 
-    _write_panel(folder / 'panel.stl', frame)
+    along, across = 0.5 * PANEL_M[0], 0.5 * PANEL_M[1]
+    corners = np.array(
+        [[-along, -across, 0], [along, -across, 0], [along, across, 0], [-along, across, 0]]
+    )
+    panel = corners @ frame.T, np.array([[0, 1, 2], [0, 2, 3]])
     entries = []
     for name, of_part in parts.items():
-        _write_pass(folder / name, frame, told_m(of_part[0][0]))
-        _write_readings(folder / f'{name}.csv', frame, [chosen[spray] for spray in of_part])
-        entries.append({
-            'name': name, 'mesh': 'panel.stl', 'trajectory': name, 'pose_topic': '/atomizer/pose',
-            'state_topic': '/atomizer/state', 'measurements': f'{name}.csv',
-            'down': [0.0, 0.0, -1.0],
-        })  # fmt: skip
+        offset_m, film_um = np.concatenate([chosen[spray] for spray in of_part]).T
+        # Where there are several sprays of a part, their troughs are repeats.
+        trough = np.array([f'T{round(m / SCALE_M_PER_IN):+d}' for m in offset_m.tolist()])
+        read = np.outer(offset_m, frame[:, 1]), trough, film_um, None
+        motion = one_pass(frame, told_m(of_part[0][0]))
+        part = Part(name, *panel, *motion, *read, *3 * (np.empty(0),))
+        entries.append(part.write(folder))
     plane_m = told_m(float(np.median(heights_in)))
     (folder / 'model.yaml').write_text(yaml.safe_dump(_start(chosen, plane_m)))
     path = folder / 'campaign.yaml'
@@ -112,33 +113,12 @@ def _start(chosen: dict[Spray, np.ndarray], plane_m: float) -> dict:
     return {'planar': planar, 'projection': {'model_plane_m': plane_m, 'emission_offset_m': 0.0}}
 
 
-def _write_panel(path: Path, frame: np.ndarray) -> None:
-    along, across = 0.5 * PANEL_M[0], 0.5 * PANEL_M[1]
-    corners = np.array(
-        [[-along, -across, 0], [along, -across, 0], [along, across, 0], [-along, across, 0]]
-    )
-    faces = [[0, 1, 2], [0, 2, 3]]
-    trimesh.Trimesh(corners @ frame.T, faces, process=False).export(path)
-
-
-def _write_pass(folder: Path, frame: np.ndarray, standoff_m: float) -> None:
-    """One pass with the gun open from well before the panel until well behind it."""
+def one_pass(frame: np.ndarray, standoff_m: float) -> tuple[np.ndarray, ...]:
+    """Stamps [ns], positions, quaternions and trigger: open from well before the panel on."""
     time_s = np.arange(0.0, RUN_M / SPEED_M_PER_S + POSE_EVERY_S, POSE_EVERY_S)
     stamps = 1_700_000_000_000_000_000 + np.rint(time_s * 1e9).astype(np.int64)
     way = np.zeros((len(time_s), 3))
     way[:, 0], way[:, 2] = SPEED_M_PER_S * time_s - 0.5 * RUN_M, standoff_m
     # The tool's z looks at the panel, its x along the troughs.
     tool = Rotation.from_matrix(frame @ np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]])).as_quat()
-    log = Log(stamps, way @ frame.T, np.tile(tool, (len(time_s), 1)), stamps[:1], np.array([True]))
-    write_bag(log, folder)
-
-
-def _write_readings(path: Path, frame: np.ndarray, of_part: Sequence[np.ndarray]) -> None:
-    """The troughs of all sprays of a part; where there are several, they are repeats."""
-    with path.open('w', newline='') as file:
-        out = csv.writer(file)
-        out.writerow(['x_m', 'y_m', 'z_m', 'thickness_um', 'point'])
-        for offset_m, film_um in np.concatenate(of_part).tolist():
-            trough = round(offset_m / SCALE_M_PER_IN)
-            place = np.round(frame[:, 1] * offset_m, 5)
-            out.writerow([*place.tolist(), round(film_um, 3), f'T{trough:+d}'])
+    return stamps, way @ frame.T, np.tile(tool, (len(time_s), 1)), stamps[:1], np.array([True])

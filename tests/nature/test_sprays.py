@@ -5,43 +5,23 @@ These are six of the ways in which the sprays make a campaign; `make bench-natur
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import paint_deposition as pd
-from nature.sprays import NOZZLES, SCALE_M_PER_IN, spray_campaign, sprays
+from nature.sprays import NOZZLES, SCALE_M_PER_IN, spray_campaign
 
 pytestmark = pytest.mark.slow
 ONE, OTHER = NOZZLES
 ALIKE = {'pattern_spread', 'tcp_standoff'}
 
 
-@pytest.fixture(scope='module')
-def table(shared_data: Path) -> Path:
-    return shared_data / 'patternator_two_nozzles.csv'
-
-
-def test_the_campaigns_hold_the_measured_sprays(table, tmp_path):
-    measured = sprays(table, 'E8003')
-    campaign = pd.read_campaign(spray_campaign(table, 'E8003', tmp_path / 'campaign'))
-    assert len(campaign.experiments) == len(measured) == 9
-    assert campaign.readings.thickness_um.max() == pytest.approx(30.0)
-    for experiment, ((height_in, _), rows) in zip(
-        campaign.experiments, measured.items(), strict=True
-    ):
-        np.testing.assert_allclose(experiment.readings.thickness_um, rows[:, 1], atol=1e-3)
-        standoff_m = -np.median(experiment.path.position_m[:, 1])
-        assert standoff_m == pytest.approx(height_in * SCALE_M_PER_IN)
-
-
 @pytest.fixture
-def diagnosed(table: Path, tmp_path):
-    """Diagnoses a campaign made of sprays of a nozzle, by the options of its builder."""
-
-    def diagnose(nozzle: str, **options) -> pd.Diagnosis:
-        return pd.diagnose(pd.read_campaign(spray_campaign(table, nozzle, tmp_path, **options)))
-
-    return diagnose
+def diagnosed(shared_data: Path, tmp_path):
+    """`diagnosed(nozzle, **options)`: of a campaign, by the options of its builder."""
+    table = shared_data / 'patternator_two_nozzles.csv'
+    return lambda nozzle, **options: pd.diagnose(
+        pd.read_campaign(spray_campaign(table, nozzle, tmp_path, **options))
+    )
 
 
 def named(diagnosis: pd.Diagnosis) -> list[set[str]]:

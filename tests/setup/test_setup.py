@@ -1,7 +1,7 @@
 """The set-up's scripts as a user meets them: what is missing is named, what is done stays done."""
 
-import importlib.util
 import os
+import runpy
 import shutil
 import subprocess
 import sys
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-NEEDED_BY_SCRIPTS = ('bash', 'dirname', 'readlink', 'tail', 'uname')
+COMPLETE = ('g++', 'cmake', 'make')
 
 
 @pytest.fixture
@@ -18,16 +18,13 @@ def prerequisites(repository, tmp_path):
     """`prerequisites(tools, **variables)`: the check on a machine that has only these tools."""
 
     def run(tools, **variables):
-        for tool in (*NEEDED_BY_SCRIPTS, *tools):
+        for tool in ('bash', 'dirname', 'readlink', 'tail', 'uname', *tools):
             (tmp_path / tool).symlink_to(shutil.which(tool))
         environment = {'PATH': str(tmp_path), 'PYTHON': sys._base_executable, **variables}
         script = repository / 'setup' / 'prerequisites.sh'
         return subprocess.run([script], env=environment, capture_output=True, text=True)
 
     return run
-
-
-COMPLETE = ('g++', 'cmake', 'make')
 
 
 def test_complete_machine_names_its_python(prerequisites):
@@ -84,31 +81,25 @@ def test_commands_start_in_a_folder_with_spaces(repository, tmp_path):
 HERE = f'"{sysconfig.get_path("include")};{sysconfig.get_path("purelib")}/numpy/_core/include"'
 
 
-@pytest.fixture(scope='module')
-def repair():
-    path = Path(__file__).parents[2] / 'setup' / 'repair_cmake_exports.py'
-    spec = importlib.util.spec_from_file_location('repair_cmake_exports', path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+REPAIR = runpy.run_path(str(Path(__file__).parents[2] / 'setup/repair_cmake_exports.py'))
 
 
 @pytest.mark.parametrize('elsewhere', ['/opt/python/cp311-cp311', '/home/somebody/.venv'])
-def test_foreign_paths_become_ours_and_relative_ones_stay(repair, elsewhere):
+def test_foreign_paths_become_ours_and_relative_ones_stay(elsewhere):
     foreign = (
         f'"{elsewhere}/include/python3.11;'
         f'{elsewhere}/lib/python3.11/site-packages/numpy/_core/include"'
     )
     relative = '"${_IMPORT_PREFIX}/include/python3.11;${_IMPORT_PREFIX}/lib/libpaint.so"'
-    assert repair.repaired(foreign) == HERE
+    assert REPAIR['repaired'](foreign) == HERE
     for text in (HERE, relative):
-        assert repair.repaired(text) == text
+        assert REPAIR['repaired'](text) == text
 
 
-def test_a_hard_link_elsewhere_keeps_its_text(repair, tmp_path):
+def test_a_hard_link_elsewhere_keeps_its_text(tmp_path):
     cached, installed = tmp_path / 'cached', tmp_path / 'installed'
     cached.write_text('as built')
     installed.hardlink_to(cached)
-    repair.replace(installed, 'repaired')
+    REPAIR['replace'](installed, 'repaired')
     assert (installed.read_text(), cached.read_text()) == ('repaired', 'as built')
     assert sorted(tmp_path.iterdir()) == [cached, installed]

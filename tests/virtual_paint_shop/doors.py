@@ -115,8 +115,8 @@ class Part:
         beside = 0.5 * self.width_m - x, (x - self.left(z)) / lean
         return np.minimum.reduce([*beside, z + 0.0 * x, self.height_m - z + 0.0 * x])
 
-    def surface_mesh(self, edge_m: float = 0.012) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices (v, 3) and faces (f, 3) of the surface alone, normals toward the gun."""
+    def mesh(self, edge_m: float = 0.012) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (v, 3), faces (f, 3): surface, normals to the gun, and what is before it."""
         columns = int(np.ceil(self.width_m / edge_m)) + 1
         rows = int(np.ceil(self.height_m / (0.6 * edge_m))) + 1
         z = np.linspace(0.0, self.height_m, rows)[:, None]
@@ -125,11 +125,7 @@ class Part:
         vertices = self.point(x, z + 0.0 * x).reshape(-1, 3)
         i = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)[None, :]).ravel()
         lower, upper = (i, i + columns, i + 1), (i + 1, i + columns, i + columns + 1)
-        return vertices, np.concatenate([np.stack(lower, 1), np.stack(upper, 1)])
-
-    def mesh(self, edge_m: float = 0.012) -> tuple[np.ndarray, np.ndarray]:
-        """The surface and whatever stands in front of it, as one mesh."""
-        vertices, faces = self.surface_mesh(edge_m)
+        faces = np.concatenate([np.stack(lower, 1), np.stack(upper, 1)])
         if self.obstacle is None:
             return vertices, faces
         more, extra = self.obstacle

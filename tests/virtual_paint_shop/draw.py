@@ -20,9 +20,8 @@ def stream(seed: int, purpose: int) -> np.random.Generator:
 
 
 def draw_jobs(
-    seed: int, truths: list[Truth], experiments: tuple[str, ...], emission_offset_m: float = 0.05,
-    gun: str | None = None,
-) -> tuple[Pattern, list[Job]]:  # fmt: skip
+    seed: int, truths: list[Truth], experiments: tuple[str, ...], gun: str | None = None
+) -> tuple[Pattern, list[Job]]:
     rng = stream(seed, 2)
     door = draw_door(rng)
     for truth in truths:
@@ -35,7 +34,7 @@ def draw_jobs(
     across = max(door.height_m, door.width_m) if both_ways else door.height_m
     index, half_width = _matched_index(rng, across)
     flow, film = solids_cm3_per_s(rng), rng.uniform(13.0, 28.0)
-    pattern = draw_pattern(rng, half_width, flow, emission_offset_m)
+    pattern = draw_pattern(rng, half_width, flow)
     jobs, roll = [], None
     for name in experiments:
         own = stream(seed, 20 + EXPERIMENTS.index(name))

@@ -26,9 +26,7 @@ POSE_TOPIC, STATE_TOPIC = '/atomizer/pose', '/atomizer/state'
 def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False) -> Path:
     """Write campaign.yaml (its path is returned) into a new folder, the hidden into `truth/`."""
     folder = Path(folder)
-    if folder.exists() and any(folder.iterdir()):
-        raise FileExistsError(f'{folder} is not empty; choose another folder')
-    (folder / 'truth').mkdir(parents=True, exist_ok=True)
+    (folder / 'truth').mkdir(parents=True)
     entries = []
     for experiment in campaign.experiments:
         mesh, body = f'{experiment.part.kind}.stl', (experiment.vertices_m, experiment.faces)

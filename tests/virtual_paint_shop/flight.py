@@ -56,7 +56,6 @@ class Landings:
 
     point: np.ndarray  # which gauge point
     film_um: np.ndarray  # its share of the film there, before anything is lost
-    time_s: np.ndarray
     position_m: np.ndarray  # (h, 3)
     cos_incidence: np.ndarray
     beyond_m: np.ndarray  # path flown beyond the model plane (negative: before it)
@@ -201,14 +200,8 @@ def fly(
         capacity *= 3
     point, k, moment, hits = point[:found], k[:found], moment[:found], hits[:found]
     flow = slices.flow_0_cm3_per_s[k] * (1 - moment) + slices.flow_1_cm3_per_s[k] * moment
-    film, time_s = hits[:, 0] * flow * (duration / count)[k], slices.time_0_s[k]
-    time_s = time_s + moment * duration[k]
-    return Landings(point, film, time_s, hits[:, 1:4], hits[:, 4], hits[:, 5], hits[:, 6:9])
-
-
-def film_um(landings: Landings, points: int, kept: np.ndarray | float = 1.0) -> np.ndarray:
-    """Film at each gauge point; `kept` is the share of each landing that stays."""
-    return np.bincount(landings.point, landings.film_um * kept, minlength=points)
+    film = hits[:, 0] * flow * (duration / count)[k]
+    return Landings(point, film, hits[:, 1:4], hits[:, 4], hits[:, 5], hits[:, 6:9])
 
 
 def _surface_grid(part: Part) -> tuple[float, float, np.ndarray]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import qmc
@@ -40,14 +39,6 @@ class GaugeNoise:
         noise = np.where(struck, gross, tails if self.heavy_tails else noise)
         reading = film_um + self.sigma_um(film_um) * noise + offset_um
         return np.round(np.maximum(reading, 0.0), 2)
-
-
-class Session(NamedTuple):
-    """What was written down at a part, its film over that of its kind, and the gauge's zero."""
-
-    thickness_um: np.ndarray
-    level: float
-    offset_um: float
 
 
 @dataclass(frozen=True)
@@ -105,8 +96,11 @@ def layout(part: Part, style: str, readings: int, repeats: int, rng: np.random.G
 def measure(
     spot: np.ndarray, film_um: np.ndarray, expected_um: np.ndarray, noise: GaugeNoise,
     rng: np.random.Generator,
-) -> Session:  # fmt: skip
-    """Read (n,) films of another part in another session; repeats share spot and texture."""
+) -> tuple[np.ndarray, float, float]:  # fmt: skip
+    """Read (n,) films of another part in another session; repeats share spot and texture.
+
+    What was written down (n,), the part's film over that of its kind, and the gauge's zero [um].
+    """
     places, place = np.unique(spot, return_inverse=True)
     level = 1.0 + noise.level * rng.normal()
     offset = noise.session_offset_um * rng.normal()
@@ -115,7 +109,7 @@ def measure(
     reading = noise.read(film, rng, offset)
     slipped = rng.random(spot.size) < noise.slip_fraction
     reading[slipped] = [mistyped(value, rng) for value in reading[slipped]]
-    return Session(reading, level, offset)
+    return reading, level, offset
 
 
 def mistyped(reading_um: float, rng: np.random.Generator) -> float:

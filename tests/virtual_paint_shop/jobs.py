@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,11 +65,6 @@ class Motion:
         last = np.searchsorted(self.trigger_s, time_s, side='right') - 1
         return np.where(last < 0, False, self.trigger_on[np.maximum(last, 0)]).astype(float)
 
-    def of_passes(self, chosen: Callable[[int], bool]) -> Motion:
-        """The same motion with the gun open on some passes only."""
-        kept = np.repeat([chosen(n) for n in range(len(self.trigger_s) // 2)], 2)
-        return replace(self, trigger_s=self.trigger_s[kept], trigger_on=self.trigger_on[kept])
-
 
 @dataclass(frozen=True)
 class Log:
@@ -94,8 +88,9 @@ class Job:
 
     def of_brush(self, number: int) -> Job:
         """The passes of one brush only."""
-        turns = self.plan.brushes
-        motion = self.motion.of_passes(lambda n: turns[n % len(turns)] == number)
+        at, on = self.motion.trigger_s, self.motion.trigger_on
+        kept = np.repeat(np.resize(self.plan.brushes, len(at) // 2) == number, 2)
+        motion = replace(self.motion, trigger_s=at[kept], trigger_on=on[kept])
         return replace(self, plan=replace(self.plan, brushes=()), motion=motion)
 
 

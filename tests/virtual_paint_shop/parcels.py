@@ -43,20 +43,14 @@ class Parcels:
     size: np.ndarray  # 0..1, rank of the droplet's size
 
 
-def lattice(count: int, seed: int) -> np.ndarray:
-    """Kronecker points (count, 2) in the unit square: any successive ones fill it evenly."""
-    plastic = 1.324717957244746
-    shift = np.random.default_rng(seed).random(2)
-    return (shift + np.arange(count)[:, None] / [plastic, plastic**2]) % 1.0
-
-
 def conner_plume(pattern: Pattern, count: int, seed: int) -> Parcels:
     """`count` equal parcels whose density on the model plane is eq. (1).
 
-    Square -> disc (Shirley and Chiu) -> radius -> angle by inverses: even points stay even.
+    Kronecker points, of which any successive ones fill the square evenly -> disc (Shirley and
+    Chiu) -> radius -> angle by inverses: even points stay even.
     """
-    square = lattice(count, seed)
-    disc, turn = _disc(square[:, 0], square[:, 1])
+    plastic, shift = 1.324717957244746, np.random.default_rng(seed).random(2)
+    disc, turn = _disc(*((shift + np.arange(count)[:, None] / [plastic, plastic**2]) % 1.0).T)
     rho, ring, centred = _radial_densities(pattern)
     both = ring + centred
     mass = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(rho) * (both[1:] + both[:-1]))])
@@ -103,19 +97,16 @@ def mobility(u: np.ndarray) -> np.ndarray:
     return carried / carried.mean()
 
 
-def half_width_m(parcels: Parcels) -> float:
-    """SB50: full width at half the height of the pattern collapsed along the travel direction."""
-    edges = np.linspace(-0.9, 0.9, 361)
-    profile, _ = np.histogram(parcels.y_m, edges)
-    smooth = np.convolve(profile, np.hanning(9) / np.hanning(9).sum(), mode='same')
-    above = np.flatnonzero(smooth >= 0.5 * smooth.max())
-    return float(edges[above[-1] + 1] - edges[above[0]])
+def draw_pattern(rng, half_width: float, flow_cm3_per_s: float) -> Pattern:
+    """A believable bell pattern with the given SB50 (metres).
 
-
-def draw_pattern(rng, half_width: float, flow_cm3_per_s: float, emission_offset_m) -> Pattern:
-    """A believable bell pattern with the given SB50 (metres)."""
+    SB50: full width at half the height of the pattern collapsed along the travel direction.
+    """
     ranges = ((0.05, 0.35), (0.0, 0.3), (-np.pi, np.pi), (0.28, 0.40), (0.13, 0.20), (0.20, 0.30))
     shape = (rng.uniform(*limits) for limits in ranges)
-    raw = Pattern(flow_cm3_per_s, *shape, emission_offset_m=emission_offset_m)
-    start = raw.scaled(half_width)
-    return start.scaled(half_width / half_width_m(conner_plume(start, 1 << 15, seed=1)))
+    start = Pattern(flow_cm3_per_s, *shape).scaled(half_width)
+    edges = np.linspace(-0.9, 0.9, 361)
+    profile, _ = np.histogram(conner_plume(start, 1 << 15, seed=1).y_m, edges)
+    smooth = np.convolve(profile, np.hanning(9) / np.hanning(9).sum(), mode='same')
+    above = np.flatnonzero(smooth >= 0.5 * smooth.max())
+    return start.scaled(half_width / float(edges[above[-1] + 1] - edges[above[0]]))

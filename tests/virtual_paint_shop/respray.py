@@ -9,7 +9,6 @@ import numpy as np
 
 from .draw import stream, timed
 from .jobs import Job, Plan, hold
-from .parcels import Pattern
 from .shop import PARCELS, USUAL_NOISE, Bench, Campaign, Experiment, gauged
 from .truths import Scene, Truth
 
@@ -24,28 +23,18 @@ OF_DRAUGHT = ('air_drift',)
 
 
 def sprayed_again(
-    campaign: Campaign, truths: list[Truth], name: str, changes: Sequence[str], seed: int, **more
-) -> Campaign:
-    """The campaign with one more part like that of an experiment; see ``respray``."""
-    experiment = next(e for e in campaign.experiments if e.name == name)
-    again = respray(campaign.pattern, truths, experiment, changes, seed, **more)
-    return replace(campaign, experiments=(*campaign.experiments, again))
-
-
-def respray(
-    pattern: Pattern, truths: list[Truth], experiment: Experiment, changes: Sequence[str],
-    seed: int, *, stand: Mapping[str, float] | None = None, parcels: int = PARCELS,
-) -> Experiment:  # fmt: skip
-    """Paint another part like that of an experiment, with changes, and measure the same points.
+    campaign: Campaign, truths: list[Truth], name: str, changes: Sequence[str], seed: int, *,
+    stand: Mapping[str, float] | None = None, parcels: int = PARCELS,
+) -> Campaign:  # fmt: skip
+    """The campaign and another part like that of an experiment, with changes; the same points.
 
     stand: where the gun stands (x_m, y_m, z_m), how far off (standoff_m), how long open (dwell_s).
     Teaching, level, zero and noise are drawn anew; the hidden effects and the bell are the same.
     """
     rng = stream(seed, 60)
+    experiment = next(e for e in campaign.experiments if e.name == name)
     part, plan = experiment.part, experiment.plan
     for change in changes:
-        if change not in PLANS:
-            raise ValueError(f'no change {change!r}; there are: {", ".join(PLANS)}')
         plan = PLANS[change](plan, part)
     if stand is None:
         plan, motion = timed(part, plan, rng)
@@ -64,11 +53,12 @@ def respray(
     _, first = np.unique(experiment.readings.point, return_index=True)
     x, _, z = experiment.readings.positions_m[np.sort(first)].T
     job = Job(f'{experiment.name}_next', part, plan, motion)
-    sprayed = replace(pattern, K1_cm3_per_s=arriving * pattern.K1_cm3_per_s)
+    sprayed = replace(campaign.pattern, K1_cm3_per_s=arriving * campaign.pattern.K1_cm3_per_s)
     bench = Bench(seed, job, sprayed, parcels)
     films = *bench.readings(truths, x, z), bench.readings([], x, z)[0]
     level, offset = 1.0 + LEVEL * rng.normal(), SESSION_UM * rng.normal()
-    return gauged(job, x, z, films, USUAL_NOISE, level, offset, rng)
+    again = gauged(job, x, z, films, USUAL_NOISE, level, offset, rng)
+    return replace(campaign, experiments=(*campaign.experiments, again))
 
 
 def _longer_open(plan: Plan, part) -> Plan:

@@ -9,12 +9,12 @@ from types import MappingProxyType
 import numpy as np
 
 from .doors import Part, flat_panel
-from .draw import EXPERIMENTS, brush_beside, draw_jobs, solids_cm3_per_s, stream, timed
-from .flight import Air, Landings, film_um, fly
+from .draw import brush_beside, draw_jobs, solids_cm3_per_s, stream, timed
+from .flight import Air, Landings, fly
 from .gauge import GaugeNoise, Readings, Spots, keep_clear, layout, scatter, tabulate
 from .jobs import Job, Log, Plan, record, slices
 from .parcels import Pattern, conner_plume, draw_pattern
-from .truths import Scene, Truth, changes_flight, choose, plain
+from .truths import Scene, Truth, choose, plain
 
 PARCELS = 8_000_000
 POOL = 1 << 19
@@ -40,48 +40,31 @@ class Experiment:
 class Campaign:
     """Experiments with one bell and one hidden truth."""
 
-    seed: int
     pattern: Pattern
     experiments: tuple[Experiment, ...]
     truth: dict
-
-
-@dataclass(frozen=True)
-class Taking:
-    """How a part is measured."""
-
-    readings: int
-    repeats: int
-    heldout: int
-    style: str | None  # None for any
-    noise: GaugeNoise
 
 
 def generate(
     seed: int, truth: str | list[str] | None = None, *, experiments: tuple[str, ...] = ('door',),
     readings: int = 100, repeats: int = 25, heldout: int = 60, style: str | None = None,
     noise: GaugeNoise = USUAL_NOISE, amplitude: float | dict | None = None, scale: float = 1.0,
-    gun: str | None = None, parcels: int = PARCELS, mesh_edge_m: float = 0.012,
-    second_brush: float | None = None,
+    parcels: int = PARCELS, mesh_edge_m: float = 0.012, second_brush: float | None = None,
 ) -> Campaign:  # fmt: skip
     """A campaign; the same seed gives the same doors, paths, layout and noise for any truth.
 
     truth: None, an effect id, 'id~form', 'unknown:...', 'footprint:...', 'a+b' or a list.
-    style: 'columns', 'rows', 'random' or None for any. gun: 'outside', 'near_edge' or None.
+    style: 'columns', 'rows', 'random' or None for any.
     amplitude: instead of typical x U(0.7, 2), in the effect's unit (dict: by id); scale multiplies
     a drawn one. second_brush: every other pass is painted with a brush 2, so many times as wide.
-    Raises ValueError for a name that does not exist.
     """
-    strange = set(experiments) - set(EXPERIMENTS)
-    if strange:
-        raise ValueError(f'no experiment {strange.pop()!r}; there are: {", ".join(EXPERIMENTS)}')
     truths = choose(truth, stream(seed, 1), amplitude, scale)
-    pattern, jobs = draw_jobs(seed, truths, experiments, gun=gun)
+    pattern, jobs = draw_jobs(seed, truths, experiments)
     brushes = {} if second_brush is None else {1: pattern, 2: brush_beside(pattern, second_brush)}
     jobs = [replace(job, plan=replace(job.plan, brushes=tuple(brushes))) for job in jobs]
-    taking = Taking(readings, repeats, heldout, style, noise)
-    how = pattern, truths, taking, parcels, mesh_edge_m, brushes
-    painted = [_paint(seed, number, job, *how) for number, job in enumerate(jobs)]
+    how = {'readings': readings, 'repeats': repeats, 'heldout': heldout, 'style': style,
+           'noise': noise, 'mesh_edge_m': mesh_edge_m, 'brushes': brushes}  # fmt: skip
+    painted = [_paint(seed, n, job, pattern, truths, parcels, **how) for n, job in enumerate(jobs)]
     return _campaign(seed, pattern, painted, truths, brushes)
 
 
@@ -91,15 +74,14 @@ def panel_study(
 ) -> Campaign:  # fmt: skip
     """A flat panel, three passes of a bell (SB50 near 0.57 m), 20 um of film at 0.577 m."""
     rng = stream(seed, 11)
-    pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng), 0.05)
+    pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng))
     speed = pattern.K1_cm3_per_s / (20.0 * 0.577)
     plan = Plan(index_m=index_m, passes=3, standoff_m=0.25, follow=0.0, overrun_m=0.55,
                 gun_margin_m=0.50, teach_error_m=0.0, speed_m_per_s=speed)  # fmt: skip
     part = flat_panel(0.6, 2 * index_m + 0.5)
     job = Job('panel', part, *timed(part, plan, stream(seed, 12)))
-    taking = Taking(readings, repeats, 40, 'columns', USUAL_NOISE)
-    painted = [_paint(seed, 0, job, pattern, [], taking, parcels)]
-    return _campaign(seed, pattern, painted, [], {})
+    painted = _paint(seed, 0, job, pattern, [], parcels, readings=readings, repeats=repeats)
+    return _campaign(seed, pattern, [painted], [], {})
 
 
 class Bench:
@@ -136,10 +118,15 @@ class Bench:
         kept = 1.0
         for truth in truths:
             kept = kept * truth.on_landing(landings, self.scene)
-        return film_um(landings, x.size, kept)
+        return np.bincount(landings.point, landings.film_um * kept, minlength=x.size)
 
     def _landings(self, truths: list[Truth], x: np.ndarray, z: np.ndarray) -> Landings:
-        flying = [t for t in truths if changes_flight(t)]
+        # Those by which the parcels land elsewhere or in other numbers than in the clean job.
+        places = ('on_plume', 'on_motion', 'on_flow', 'on_air')
+        flying = [
+            truth for truth in truths
+            if any(getattr(type(truth), one) is not getattr(Truth, one) for one in places)
+        ]  # fmt: skip
         key = (x.tobytes(), z.tobytes())
         if not flying and key in self._clean_landings:
             return self._clean_landings[key]
@@ -163,13 +150,15 @@ class Bench:
 
 
 def _paint(
-    seed: int, number: int, job: Job, pattern: Pattern, truths: list[Truth], taking: Taking,
-    parcels: int, mesh_edge_m: float = 0.012, brushes: Mapping[int, Pattern] = NO_BRUSHES,
+    seed: int, number: int, job: Job, pattern: Pattern, truths: list[Truth], parcels: int, *,
+    readings: int, repeats: int, heldout: int = 40, style: str | None = 'columns',
+    noise: GaugeNoise = USUAL_NOISE, mesh_edge_m: float = 0.012,
+    brushes: Mapping[int, Pattern] = NO_BRUSHES,
 ) -> Experiment:  # fmt: skip
-    rng, noise = stream(seed, 40 + number), taking.noise
-    style = taking.style or str(rng.choice(['columns', 'rows', 'random']))
-    spots = keep_clear(job.part, layout(job.part, style, taking.readings, taking.repeats, rng))
-    others = keep_clear(job.part, Spots.at(*scatter(job.part, taking.heldout, rng, 0.015)))
+    rng = stream(seed, 40 + number)
+    style = style or str(rng.choice(['columns', 'rows', 'random']))
+    spots = keep_clear(job.part, layout(job.part, style, readings, repeats, rng))
+    others = keep_clear(job.part, Spots.at(*scatter(job.part, heldout, rng, 0.015)))
     at_x, at_z = np.concatenate([spots.x_m, others.x_m]), np.concatenate([spots.z_m, others.z_m])
     bench = Bench(seed, job, pattern, parcels, brushes)
     clean, _ = bench.readings([], at_x, at_z)
@@ -209,4 +198,4 @@ def _campaign(
         'hidden': [t.as_dict() for t in truths], 'pattern': asdict(pattern),
         'brushes': {number: asdict(each) for number, each in brushes.items()},
     }  # fmt: skip
-    return Campaign(seed, pattern, tuple(painted), plain(truth))
+    return Campaign(pattern, tuple(painted), plain(truth))

@@ -106,12 +106,6 @@ class Truth:
         return kind | amount | plain(self.drawn)
 
 
-def changes_flight(truth: Truth) -> bool:
-    """Whether the parcels land elsewhere or in other numbers than in the clean job."""
-    places = ('on_plume', 'on_motion', 'on_flow', 'on_air')
-    return any(getattr(type(truth), place) is not getattr(Truth, place) for place in places)
-
-
 def variant(base: type[Truth], form: str, why: str, **members: object) -> type[Truth]:
     """Another form of an effect's law: `members` in the place of the base's, `why` in words."""
     for name, one in members.items():
@@ -151,8 +145,6 @@ def choose(
     names = spec.split('+') if isinstance(spec, str) else list(spec)
     truths = []
     for name in names:
-        if name not in known:
-            raise ValueError(f'no truth {name!r}; there are: {", ".join(sorted(known))}')
         wanted = amplitude.get(name) if isinstance(amplitude, dict) else amplitude
         truths.append(known[name].draw(rng, wanted, scale))
     return truths

@@ -28,25 +28,22 @@ class Sag(Truth):
         change = RectBivariateSpline(xs, fine_z, after - before, kx=3, ky=1)
         return film_um + change.ev(x, z)
 
-    def run_down(self, film_um, dz_m):
-        return run_down(film_um, dz_m, self.amplitude, self.power, self.yield_um)
+    def run_down(self, film_um: np.ndarray, dz_m: float) -> np.ndarray:
+        """Film (columns, heights bottom to top) after running: its flux ~ (T - yield)^power."""
+        power, yield_um = self.power, self.yield_um
+        total = self.amplitude / (SAG_REFERENCE_UM - yield_um) ** power
+        moving = np.maximum(film_um - yield_um, 0.0)
+        fastest = power * total * moving.max() ** (power - 1.0)
+        steps = int(np.ceil(2.0 * fastest / dz_m)) + 8
+        for weight in np.full(steps, 1.0 / steps):
+            crossing = total * weight * np.maximum(film_um - yield_um, 0.0) ** power
+            arriving = np.concatenate([crossing[:, 1:], np.zeros((len(film_um), 1))], axis=1)
+            film_um = film_um + (arriving - crossing) / dz_m
+        return film_um
 
 
 variant(Sag, 'yield', 'A yield stress: only film above 8 um runs.', yield_um=8.0)
 variant(Sag, 'shear_thinning', 'A power-law fluid of index 0.6.', power=2.0 + 1.0 / 0.6)
-
-
-def run_down(film_um: np.ndarray, dz_m: float, volume_um_m: float, power, yield_um) -> np.ndarray:
-    """Film (columns, heights bottom to top) after running down: its flux ~ (T - yield)^power."""
-    total = volume_um_m / (SAG_REFERENCE_UM - yield_um) ** power
-    moving = np.maximum(film_um - yield_um, 0.0)
-    fastest = power * total * moving.max() ** (power - 1.0)
-    steps = int(np.ceil(2.0 * fastest / dz_m)) + 8
-    for weight in np.full(steps, 1.0 / steps):
-        crossing = total * weight * np.maximum(film_um - yield_um, 0.0) ** power
-        arriving = np.concatenate([crossing[:, 1:], np.zeros((len(film_um), 1))], axis=1)
-        film_um = film_um + (arriving - crossing) / dz_m
-    return film_um
 
 
 class OversprayFog(Truth):
@@ -55,17 +52,14 @@ class OversprayFog(Truth):
     id, family, typical, most, unit = 'overspray_fog', 'level', 1.0, 6.0, 'um'
 
     def on_film(self, film_um, x, z, scene, film_at):
-        return film_um + self.amplitude
+        return film_um + self.amplitude * self.settled(x / (0.5 * scene.part.width_m))
+
+    def settled(self, aside: np.ndarray) -> np.ndarray:
+        return 1.0
 
 
-class FogThinsOut(OversprayFog):
-    """A cloud over the part's middle that thins out towards its sides by a third."""
-
-    form = 'thins_out'
-
-    def on_film(self, film_um, x, z, scene, film_at):
-        side = np.abs(x) / (0.5 * scene.part.width_m)
-        return film_um + self.amplitude * (1.0 - 0.35 * side**2)
+variant(OversprayFog, 'thins_out', "A cloud over the part's middle, less by a third at the sides.",
+        settled=lambda self, aside: 1.0 - 0.35 * np.abs(aside) ** 2)  # fmt: skip
 
 
 class FogGradient(Truth):
@@ -83,16 +77,10 @@ class FogGradient(Truth):
 
 variant(FogGradient, 'exponential', 'Fog that is used up on its way: e-fold over a third.',
         settled=lambda self, share: np.exp(-3.0 * share))  # fmt: skip
-
-
-class FogLayer(FogGradient):
-    """A layer of fog over the floor that reaches up to some height of the part."""
-
-    form = 'layer'
-    ranges = between(top=(0.25, 0.6))
-
-    def settled(self, share):
-        return 1.0 / (1.0 + np.exp((share - self.drawn['top']) / 0.07))
+variant(FogGradient, 'layer', 'Fog over the floor that reaches up to some height of the part.',
+        ranges=between(top=(0.25, 0.6)),
+        settled=lambda self, share: 1.0 / (1.0 + np.exp((share - self.drawn['top']) / 0.07)),
+        )  # fmt: skip
 
 
 class GaugeGain(Truth):

@@ -58,11 +58,15 @@ class PartMisalignment(Truth):
     def on_motion(self, motion, scene):
         if scene.part.kind != 'door':
             return motion
-        centre = np.array([0.0, 0.0, 0.5 * scene.part.height_m])
-        back = Rotation.from_rotvec(-np.asarray(self.drawn['turn_rad'])).as_matrix()
-        shift = self.amplitude * np.asarray(self.drawn['direction'])
-        tcp_m = (motion.tcp_m - centre - shift) @ back.T + centre
+        height_m, shift_m, turn_rad = self.hung(scene.part)
+        about, back = np.array([0.0, 0.0, height_m]), Rotation.from_rotvec(-turn_rad).as_matrix()
+        tcp_m = (motion.tcp_m - about - shift_m) @ back.T + about
         return replace(motion, tcp_m=tcp_m, turn=back @ motion.turn)
+
+    def hung(self, part):
+        """Height that it is turned about, shift and turn."""
+        shift_m = self.amplitude * np.asarray(self.drawn['direction'])
+        return 0.5 * part.height_m, shift_m, np.asarray(self.drawn['turn_rad'])
 
 
 class PoseLag(Truth):
@@ -200,15 +204,9 @@ class MisalignmentSwing(PartMisalignment):
     def details(cls, rng):
         return {'side': rng.choice([-1.0, 1.0])}
 
-    def on_motion(self, motion, scene):
-        part = scene.part
-        if part.kind != 'door':
-            return motion
-        hanger = np.array([0.0, 0.0, part.height_m])
+    def hung(self, part):
         angle = self.drawn['side'] * self.amplitude / part.height_m
-        back = Rotation.from_rotvec([-angle, 0.0, 0.0]).as_matrix()
-        tcp_m = (motion.tcp_m - hanger) @ back.T + hanger
-        return replace(motion, tcp_m=tcp_m, turn=back @ motion.turn)
+        return part.height_m, 0.0, np.array([angle, 0.0, 0.0])
 
 
 class TriggerDelay(TriggerLag):

@@ -54,13 +54,10 @@ variant(IncidenceAttraction, 'tangent', "A droplet's sideways momentum: tan^2, s
 variant(IncidenceAttraction, 'late', 'Nothing up to 12 degrees, and linear beyond.', away=_late)
 
 
-class IncidencePower(IncidenceAttraction):
-    """A power of the cosine, as sticking laws of thermal spraying have it."""
-
-    form, most = 'power', 1.2
-
-    def on_landing(self, landings, scene):
-        return np.maximum(landings.cos_incidence, 0.2) ** -self.amplitude
+variant(IncidenceAttraction, 'power', 'As sticking laws of thermal spraying have it.', most=1.2,
+        on_landing=lambda self, landings, scene: (
+            np.maximum(landings.cos_incidence, 0.2) ** -self.amplitude),
+        )  # fmt: skip
 
 
 class ConvexAttraction(Truth):

@@ -45,19 +45,14 @@ def drifting(study, fit):
     return Study.of(pd.Campaign((panel.with_readings(readings),)), drifting.effects)
 
 
-@pytest.fixture(scope='module')
-def drift_or_tool(drifting, fit):
-    """Drifting air, or a tool that is off its point: what says which."""
+@pytest.mark.slow
+def test_a_rolled_gun_tells_air_from_a_tool_and_places_lie_apart(drifting, fit):
+    """The air drifts in the booth, or the tool is off its point in its own frame."""
     found = drifting.fit(FreeParameters.of(fit.model))
     group = EffectClass(('air_drift', 'tcp_offset'), 0.9, 'air_drift')
     rivals = contenders_of(diagnosed(drifting, found, group), EFFECTS)
-    return next_experiment.propose(drifting, rivals)
-
-
-@pytest.mark.slow
-def test_a_rolled_gun_tells_air_from_a_tool_and_places_lie_apart(drifting, drift_or_tool, study):
-    """The air drifts in the booth, the tool is off in its own frame."""
-    by_changes = {spray.changes: spray for spray in drift_or_tool[1]}
+    places, sprays = next_experiment.propose(drifting, rivals)
+    by_changes = {spray.changes: spray for spray in sprays}
     rolled = by_changes['roll_180',]
     assert rolled.separates == ('air_drift', 'tcp_offset', 'footprint')
     assert rolled.separation > 2.0 * rolled.now
@@ -72,13 +67,11 @@ def test_a_rolled_gun_tells_air_from_a_tool_and_places_lie_apart(drifting, drift
     assert f'{told["dwell_s"]:.1f} s' in spot.what
     assert told['peak_um'] <= drifting.measured_um.max()
     at = np.array([told['x_m'], told['y_m'], told['z_m']])
-    points = drifting.campaign.experiments[0].measured_points
-    (row,) = np.flatnonzero((points.positions_m == at).all(axis=1))
+    (panel,) = drifting.campaign.experiments
+    (row,) = np.flatnonzero((panel.measured_points.positions_m == at).all(axis=1))
     assert told['film_um'] == pytest.approx(drifting.measured_um[row])
-    places, _ = drift_or_tool
     positions = np.array([place.position_m for place in places])
-    surface = study.campaign.experiments[0].surface
-    at = surface.at(positions)
+    at = panel.surface.at(positions)
     assert at.positions_m == pytest.approx(positions, abs=1e-9)
     assert (at.edge_distance_m > next_experiment.EDGE_MARGIN_M).all()
     apart = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2)
@@ -88,7 +81,7 @@ def test_a_rolled_gun_tells_air_from_a_tool_and_places_lie_apart(drifting, drift
     assert [told[axis] for axis in ('x_m', 'y_m', 'z_m')] == positions[0].tolist()
     assert (told['experiment'], told['why']) == (places[0].experiment, places[0].why)
     film_um = np.array([place.film_um for place in places])
-    assert 0.2 * study.measured_um.mean() < film_um.min() < film_um.max() < 100.0
+    assert 0.2 * drifting.measured_um.mean() < film_um.min() < film_um.max() < 100.0
 
 
 def test_without_voltage_what_needs_it_is_gone(study):
@@ -166,24 +159,17 @@ def forecast(spread: float = 1.0) -> Forecast:
     return Forecast(contenders, np.array([0.0, 0.4, 1.0]), means, np.linalg.cholesky(covariances))
 
 
-def log_odds_drawn(told: Forecast, true: int, other: int) -> np.ndarray:
-    """(DRAWS,) logarithm of the odds of the true one after readings that it gives."""
-    rng = np.random.default_rng(4)
-    each = zip(told.means, told.factors, strict=True)
-    laws = [multivariate_normal(mean, factor @ factor.T) for mean, factor in each]
-    readings = laws[true].rvs(DRAWS, rng)
-    return told.odds[true, other] + laws[true].logpdf(readings) - laws[other].logpdf(readings)
-
-
 def test_the_log_odds_are_those_of_drawn_readings_and_nothing_tells_between_the_same():
     told = forecast()
+    each = zip(told.means, told.factors, strict=True)
+    laws = [multivariate_normal(mean, factor @ factor.T) for mean, factor in each]
     for true, other in ((0, 1), (1, 0), (0, 2)):
-        drawn = log_odds_drawn(told, true, other)
+        readings = laws[true].rvs(DRAWS, np.random.default_rng(4))
+        drawn = told.odds[true, other] + laws[true].logpdf(readings) - laws[other].logpdf(readings)
         mean, variance = told.gains[:, true, other]
         error = drawn.std() / np.sqrt(DRAWS)
         assert told.odds[true, other] + mean == pytest.approx(drawn.mean(), abs=4.0 * error)
         assert variance == pytest.approx(drawn.var(), rel=0.05)
-    told = forecast()
     means, factors = np.tile(told.means[0], (3, 1)), np.tile(told.factors[0], (3, 1, 1))
     same = replace(told, log_weight=np.zeros(3), means=means, factors=factors)
     assert same.separations == pytest.approx((0.0, 0.0), abs=1e-6)

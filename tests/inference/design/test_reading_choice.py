@@ -101,7 +101,6 @@ def test_a_part_without_paint_and_impossible_wishes_are_refused():
 
 BELL = pd.DepositionModel()
 MOST_UM = 25.0
-BY_KEY = {change.key: change for change in MENU}
 
 
 @pytest.fixture(scope='module')
@@ -109,7 +108,8 @@ def sample_panel(sample):
     return sample.experiments[0]
 
 
-def stand(sample_panel) -> StationarySpray:
+@pytest.fixture(scope='module')
+def one(sample_panel) -> StationarySpray:
     return StationarySpray.before(sample_panel, spots(sample_panel, 1)[0], BELL, MOST_UM)
 
 
@@ -117,8 +117,7 @@ def film_um(sample_panel, one, model=BELL):
     return Forward(pd.Campaign((one.sprayed(sample_panel),)), model.effects).predict_um(model)
 
 
-def test_the_gun_stands_square_before_a_spot_at_the_distance_of_the_passes(sample_panel):
-    one = stand(sample_panel)
+def test_the_gun_stands_square_before_a_spot_as_far_and_as_long_as_suits(sample_panel, one):
     path = one.sprayed(sample_panel).path
     assert path.rotation[:, :, 2] == pytest.approx(np.tile(-one.normal, (len(path), 1)), abs=1e-9)
     away = path.position_m - one.position_m
@@ -127,16 +126,14 @@ def test_the_gun_stands_square_before_a_spot_at_the_distance_of_the_passes(sampl
     assert path.speed_m_per_s.max() == 0.0
     # The tool is turned about its axis as it was on the passes.
     assert one.across @ sample_panel.path.rotation[0, :, 0] > 0.99
-
-
-def test_the_film_stays_within_the_one_given_and_comes_near_it(sample_panel):
-    one = stand(sample_panel)
+    # The film stays within the one given and comes near it.
     film = film_um(sample_panel, one)
     assert 0.7 * MOST_UM < film.max() <= one.peak_um <= MOST_UM
     half = film_um(sample_panel, replace(one, dwell_s=0.5 * one.dwell_s))
     assert half == pytest.approx(0.5 * film, rel=1e-9)
     spot = spots(sample_panel, 1)[0]
-    closer = StationarySpray.before(BY_KEY['closer'].made(sample_panel), spot, BELL, MOST_UM)
+    (nearer,) = (change.made(sample_panel) for change in MENU if change.key == 'closer')
+    closer = StationarySpray.before(nearer, spot, BELL, MOST_UM)
     assert closer.dwell_s < one.dwell_s
     assert 0.7 * MOST_UM < film_um(sample_panel, closer).max() <= MOST_UM
     # Half a second is needed: the trigger is not quick enough for less film.
@@ -144,12 +141,11 @@ def test_the_film_stays_within_the_one_given_and_comes_near_it(sample_panel):
 
 
 @pytest.mark.parametrize('name', ['corner_slowdown', 'gun_wake', 'pose_lag'])
-def test_effects_of_motion_do_not_show(sample_panel, name):
+def test_effects_of_motion_do_not_show(sample_panel, one, name):
     effect = EFFECTS[name].typical()
     model = BELL.model_copy(update={'effects': (effect,)})
     passes = Forward(pd.Campaign((sample_panel,)), (effect,))
     assert np.abs(passes.predict_um(model) - passes.predict_um(BELL)).max() > 1e-4
-    one = stand(sample_panel)
     assert film_um(sample_panel, one, model) == pytest.approx(film_um(sample_panel, one), abs=1e-9)
 
 

@@ -1,17 +1,13 @@
 """Fits of models that are exactly linear, to compare closed forms with direct ones."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.learned_laws import LearnedFootprint
-from paint_deposition.inference.diagnosis.discrepancy import Footprints, ModelDiscrepancy
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, Sensitivity
 from paint_deposition.inference.diagnosis.gaussian import NullModel
-from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 
@@ -58,19 +54,6 @@ def fit_linear(jacobian: np.ndarray, data: np.ndarray, parameters=PARAMETERS) ->
 def null_of(fit: Fit, nuisance: np.ndarray | None = None) -> NullModel:
     """The null hypothesis around a fit, with nuisance directions (P, n) or none."""
     return NullModel.around(fit, fit.nuisance if nuisance is None else nuisance)
-
-
-def discrepancy_of(
-    fields: Sequence[np.ndarray], footprint: np.ndarray, sizes: Sequence[float]
-) -> ModelDiscrepancy:
-    """Fields (P, P) of three lengths and a deviation of the footprint (P, 1), but nothing else."""
-    none, unseen = np.zeros_like(fields[0]), np.empty((0, 1))
-    basis = Basis(LearnedFootprint, {}, unseen, unseen.T, 1.0)
-    columns = tuple(size * footprint for size in sizes)
-    laws = tuple(RandomLaw(basis, 0.1 * size * np.eye(1)) for size in sizes)
-    footprints = Footprints(columns, laws, radius_m=np.zeros(1), flux=np.ones(1))
-    rest = 3 * (none,), False, (0.02, 0.05, 0.1), np.zeros(len(none), dtype=int)
-    return ModelDiscrepancy(MODEL, footprints, none, tuple(fields), *rest)
 
 
 def law(name: str, *columns: np.ndarray, side=1.0, share=1.0, **shape: float) -> Explanation:

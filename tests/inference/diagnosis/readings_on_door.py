@@ -6,14 +6,12 @@ import numpy as np
 
 import paint_deposition as pd
 from booth import MODEL, door, painted, panel, path_of, serpentine
-from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 
 # Two passes of few sub-steps, over the door's arch and edges and over the panel.
 PASSES_M = {'door': (0.75, 0.45), 'panel': (0.05, -0.1)}
-LEAST_UM = 1.0
 
 # A door of the virtual paint shop, and one with a shielded valley.
 DOOR = {
@@ -27,7 +25,7 @@ def measured(surface: pd.Surface, name: str, count: int = 24, **options) -> Expe
     """An experiment with readings at places that got some paint."""
     path = path_of(serpentine(PASSES_M[name], opens_at_m=0.3, period_s=0.1))
     film_um = painted(surface, path).raw_um
-    at = np.random.default_rng(1).choice(np.flatnonzero(film_um > LEAST_UM), count, replace=False)
+    at = np.random.default_rng(1).choice(np.flatnonzero(film_um > 1.0), count, replace=False)
     readings = pd.Readings.of(surface.vertices_m[at], film_um[at], normals=surface.normals[at])
     return Experiment.of(name, surface, path, readings, **options)
 
@@ -59,7 +57,7 @@ def plate_with_a_back() -> Experiment:
     return part.with_readings(both)
 
 
-def at_model(study: Study, model=MODEL) -> Fit:
+def at_model(study: Study, model=MODEL):
     """A fit that has found this model."""
     parameters = FreeParameters.of(model, *model.effects)
     return study.beside(parameters, parameters.encode(model))

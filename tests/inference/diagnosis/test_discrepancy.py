@@ -14,7 +14,6 @@ from paint_deposition.inference.design.sprays import MENU
 from paint_deposition.inference.diagnosis import discrepancy as of_nature
 from paint_deposition.inference.diagnosis.discrepancy import FINE_RADII, PRIOR, ModelDiscrepancy
 from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
-from paint_deposition.inference.fitting.study import Study
 
 # Parts of the study: a door, and a panel twice.
 DOOR, FIRST, SECOND = range(3)
@@ -22,7 +21,7 @@ X = np.array([1.0, 0.0, 0.0])
 
 
 @pytest.fixture(scope='module')
-def study() -> Study:
+def study():
     return study_of(on_door(count=16), on_panel('first'), on_panel('second'))
 
 
@@ -32,13 +31,13 @@ def discrepancy(study) -> ModelDiscrepancy:
 
 
 @pytest.fixture(scope='module')
-def alone() -> tuple[Study, ModelDiscrepancy]:
+def alone():
     """The door as the only part."""
     study = study_of(on_door(count=16))
     return study, ModelDiscrepancy.of(study, at_model(study))
 
 
-def between(study: Study, covariance: np.ndarray, one: int, other: int) -> np.ndarray:
+def between(study, covariance: np.ndarray, one: int, other: int) -> np.ndarray:
     owner = study.campaign.experiment_of
     return covariance[np.ix_(owner == one, owner == other)]
 

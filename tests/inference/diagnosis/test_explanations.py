@@ -8,25 +8,23 @@ import pytest
 from booth import MODEL
 from inference.diagnosis.linear import linear_fit
 from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a_back, study_of
-from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.files.effect_file import COVARIATES
 from paint_deposition.inference.diagnosis import explanations
 from paint_deposition.inference.diagnosis.closed_forms import fitting_forms, forms_of
 from paint_deposition.inference.fitting.least_squares import derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.study import Study
 
 EDGE = EFFECTS['edge_build'](gain=0.3, length_m=0.05)
 
 
 @pytest.fixture(scope='module')
-def study() -> Study:
+def study():
     return study_of(on_door())
 
 
 def errors(
-    study: Study, *effects: Effect, kept: tuple[str, ...] | None = None, of=explanations.law_errors
+    study, *effects, kept: tuple[str, ...] | None = None, of=explanations.law_errors
 ) -> np.ndarray:
     """(P, n) of a model with these effects, of which all or some are kept.
 
@@ -39,7 +37,7 @@ def errors(
     return of(study, fit, frozenset(ids), fit.model)
 
 
-def change_um(study: Study, effect: Effect) -> np.ndarray:
+def change_um(study, effect) -> np.ndarray:
     """(P,) what an effect adds to the readings [um]."""
     predict = study.forward.predict_um
     return predict(MODEL.with_effect(effect)) - predict(MODEL)
@@ -98,10 +96,6 @@ def test_geometry_and_gauge_have_no_law_that_could_be_off(study, effect):
     assert not errors(study, type(EDGE)()).any()
 
 
-def test_an_own_effect_may_name_any_covariate_and_no_other(study):
-    assert set(COVARIATES) == set(study.rays(MODEL)[0].along)
-
-
 def test_a_law_that_may_have_any_form_is_off_by_a_share_of_its_largest_effect(study):
     """Where it does least as much as where it does most: the law itself may be elsewhere."""
     change = change_um(study, EDGE)
@@ -124,7 +118,7 @@ def test_errors_of_several_effects_are_independent(study):
 
 
 @pytest.fixture(scope='module')
-def doors() -> Study:
+def doors():
     """Two doors, the second painted without voltage."""
     off = on_door(switched_off=frozenset(['voltage']))
     return study_of(on_door(), replace(off, name='without voltage'))
@@ -158,6 +152,8 @@ def test_the_correction_of_a_law_acts_where_its_effect_does(doors):
 
 def test_laws_of_any_form_leave_the_film_as_a_whole_as_it_is(study):
     """How much paint there is in all is the pattern's."""
+    # An effect of one's own may name any covariate of the readings, and no other.
+    assert set(COVARIATES) == set(study.rays(MODEL)[0].along)
     fit = study.fit(FreeParameters.of(MODEL))
     laws = explanations.nonparametric_laws_of(study, MODEL)
     for found in (laws, explanations.of_footprint(study, fit)):

@@ -8,17 +8,13 @@ import pytest
 from scipy.integrate import dblquad
 from scipy.stats import f, kstest, multivariate_t, norm
 
-import paint_deposition as pd
 from booth import MODEL
 from inference.diagnosis.linear import KNOWN, PARAMETERS, fit_linear, linear_fit, null_of
 from inference.diagnosis.readings_on_door import on_door, on_panel, study_of
 from paint_deposition.effects.catalogue import LEARNED
-from paint_deposition.effects.learned_laws import LearnedLaw, hat_weights
+from paint_deposition.effects.learned_laws import hat_weights
 from paint_deposition.inference.diagnosis import gaussian, smooth_laws
 from paint_deposition.inference.diagnosis.model_space import SIZES
-from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.report.colour_scales import TWO_SIDED_95
 from reference import reference_film_um
 
@@ -129,19 +125,12 @@ def test_shifted_deviations_are_weighed_as_if_they_were_there(columns, side):
     np.testing.assert_allclose(principal.log_bayes_factors(draws, SIZES, 8.0, shifts), expected)
 
 
-LAWS = [law for name, law in LEARNED.items() if name != 'speed_m_per_s']
-OF_ANY_KIND = pytest.mark.parametrize(
-    ('law', 'kind'), [(law, kind) for law in LAWS for kind in law.kinds],
-    ids=lambda value: value if isinstance(value, str) else value.covariate,
-)  # fmt: skip
-
-
 @pytest.fixture(scope='module')
-def study() -> Study:
+def study():
     return study_of(on_door(count=12))
 
 
-def film_um(experiment: Experiment, model: pd.DepositionModel, law: LearnedLaw | None = None):
+def film_um(experiment, model, law=None) -> np.ndarray:
     """(P,) film at the readings, ray by ray, with a law in the model or none."""
     points, path = experiment.measured_points, experiment.path
     if law is None:
@@ -151,7 +140,11 @@ def film_um(experiment: Experiment, model: pd.DepositionModel, law: LearnedLaw |
 
 
 @pytest.mark.slow
-@OF_ANY_KIND
+@pytest.mark.parametrize(
+    ('law', 'kind'),
+    [(law, k) for name, law in LEARNED.items() if name != 'speed_m_per_s' for k in law.kinds],
+    ids=lambda value: value if isinstance(value, str) else value.covariate,
+)  # fmt: skip
 def test_a_random_law_changes_the_readings_as_the_law_in_the_model_does(law, kind, study):
     """No linearisation is left: film is linear in the values of one law at its knots."""
     (basis,) = smooth_laws.bases_over(study, MODEL, law, kind)
@@ -219,19 +212,10 @@ def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():
     assert of_grid == [[True, False, False], [False, True, True]]
 
 
-KNOTS, LENGTH, SIZE = 12, 3.0, 0.1
-FILM_UM, NOISE_UM = 30.0, 0.6
+KNOTS, FILM_UM, NOISE_UM = 12, 30.0, 0.6
 
 
-def at_places(places: np.ndarray) -> smooth_laws.RandomLaw:
-    """Factors over a covariate, for readings (P,) of which each has one value, in knots."""
-    settings = {'kind': 'factor', 'low': 0.0, 'high': KNOTS - 1.0}
-    film_um = FILM_UM * hat_weights(places, KNOTS)
-    at = np.arange(KNOTS, dtype=float)[:, np.newaxis]
-    return smooth_laws.Basis(LEARNED['time_s'], settings, film_um, at, 1.0).random(SIZE, LENGTH)
-
-
-def fitted(law: smooth_laws.RandomLaw, truth: np.ndarray, random: np.random.Generator) -> Fit:
+def fitted(law: smooth_laws.RandomLaw, truth: np.ndarray, random: np.random.Generator):
     """The fit of readings of a true curve (K,), the level of all film being unknown, too."""
     jacobian = np.zeros((len(law.basis.film_um), len(PARAMETERS)))
     jacobian[:, 0] = FILM_UM / NOISE_UM
@@ -251,8 +235,12 @@ def covered(law: smooth_laws.RandomLaw, truth: np.ndarray, random) -> np.ndarray
 
 @pytest.fixture
 def law() -> smooth_laws.RandomLaw:
-    """Readings that are few on one side."""
-    return at_places((KNOTS - 1) * np.random.default_rng(1).beta(1.0, 2.0, size=60))
+    """Factors over a covariate of which each reading has one value; few are on one side."""
+    places = (KNOTS - 1) * np.random.default_rng(1).beta(1.0, 2.0, size=60)
+    settings = {'kind': 'factor', 'low': 0.0, 'high': KNOTS - 1.0}
+    film_um = FILM_UM * hat_weights(places, KNOTS)
+    at = np.arange(KNOTS, dtype=float)[:, np.newaxis]
+    return smooth_laws.Basis(LEARNED['time_s'], settings, film_um, at, 1.0).random(0.1, 3.0)
 
 
 def test_the_band_holds_curves_of_the_prior_as_often_as_it_says(law):

@@ -9,12 +9,14 @@ from scipy.stats import binom, kstest, multivariate_t
 
 from inference.diagnosis import linear
 from inference.diagnosis.linear import law, unknown
+from paint_deposition.effects.learned_laws import LearnedFootprint
 from paint_deposition.inference.diagnosis import model_space, proposals
-from paint_deposition.inference.diagnosis.discrepancy import PRIOR, ModelDiscrepancy
+from paint_deposition.inference.diagnosis.discrepancy import PRIOR, Footprints, ModelDiscrepancy
 from paint_deposition.inference.diagnosis.discrepancy import DiscrepancyHyperparameters as Sizes
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.gaussian import NullModel, simulated
 from paint_deposition.inference.diagnosis.model_space import ModelSpace, WeightedNull
+from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.inference.fitting.random_effects import smooth
 
 READINGS, NULL_RUNS, POWER_RUNS = 60, 300, 200
@@ -35,11 +37,17 @@ SHARES = (0.1, 0.3, 1.0)
 
 @pytest.fixture
 def discrepancy() -> ModelDiscrepancy:
-    """Smooth fields along the part, and one deviation of the footprint."""
+    """Smooth fields along the part, and one deviation of the footprint, but nothing else."""
     away = np.abs(np.subtract.outer(PLACE, PLACE))
-    fields = [FILM**2 * smooth(away / length) for length in (0.1, 0.5, 1.0)]
+    fields = tuple(FILM**2 * smooth(away / length) for length in (0.1, 0.5, 1.0))
     footprint = np.random.default_rng(6).normal(size=(READINGS, 1))
-    return linear.discrepancy_of(fields, footprint, SHARES)
+    none, unseen = np.zeros_like(away), np.empty((0, 1))
+    basis = Basis(LearnedFootprint, {}, unseen, unseen.T, 1.0)
+    columns = tuple(size * footprint for size in SHARES)
+    laws = tuple(RandomLaw(basis, 0.1 * size * np.eye(1)) for size in SHARES)
+    footprints = Footprints(columns, laws, radius_m=np.zeros(1), flux=np.ones(1))
+    rest = 3 * (none,), False, (0.02, 0.05, 0.1), np.zeros(READINGS, dtype=int)
+    return ModelDiscrepancy(linear.MODEL, footprints, none, fields, *rest)
 
 
 @pytest.fixture

@@ -47,12 +47,6 @@ def stages(search) -> list[SearchStage]:
     return search.stages()
 
 
-@pytest.fixture(scope='module')
-def clean() -> Search:
-    """On a panel on which nothing acted."""
-    return searching(gauged(BASE, seed=2), 'fog_gradient', 'flow_drift', 'air_drift')
-
-
 def test_the_set_found_is_the_one_planted_and_leaves_less_for_something_unknown(search, stages):
     # Around the leading effects a second one is looked for at once.
     assert [len(stage.here.names) for stage in stages] == [0, 2]
@@ -120,7 +114,8 @@ def test_effects_that_look_alike_share_one_group():
     assert probability > model_space.SURE
 
 
-def test_nothing_is_added_where_nothing_acts(clean):
+def test_nothing_is_added_where_nothing_acts():
+    clean = searching(gauged(BASE, seed=2), 'fog_gradient', 'flow_drift', 'air_drift')
     (stage,) = clean.stages()
     assert stage.here is clean.nothing
     assert clean.groups(stage.here) == (clean.nothing, {})

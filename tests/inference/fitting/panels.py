@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 import paint_deposition as pd
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.study import TEXTURE_SHARE
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
+from scenes import painted
 
 # A panel stands in x-z and looks to +y; the gun looks along -y with its x axis along x.
 FACING = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
@@ -77,9 +77,8 @@ def painted_by(
 ) -> Experiment:  # fmt: skip
     """A panel that the model painted and a gauge measured, its film times a texture (N,)."""
     path = motion if isinstance(motion, SprayPath) else spray_path(motion)[0]
-    integrator = FilmIntegrator(surface.at(points_m), model, 'double')
-    integrator.add(path)
-    readings = readings_at(points_m, integrator.gauge_um * texture, **noise)
+    film = painted(surface.at(points_m), path, model, 'double')
+    readings = readings_at(points_m, film.gauge_um * texture, **noise)
     return Experiment.of(name, surface, path, readings)
 
 

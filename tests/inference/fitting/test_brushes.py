@@ -17,7 +17,6 @@ from paint_deposition.inference.fitting.calibration import brush_figures
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.inference.fitting.posterior import of_brushes, with_brushes_of
-from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PATTERN, Brush, PlanarPattern
 
 PHI_RAD = 0.1
@@ -32,15 +31,12 @@ SETTINGS = {
     4: {'flow_cm3_per_min': 200.0, 'solids': 0.45, 'bell_speed_rpm': 25e3},
 }
 TRUTH = pd.DepositionModel(
-    brushes=[
-        Brush(number=1, planar=FIRST, **SETTINGS[1]),
-        Brush(number=4, planar=SECOND, **SETTINGS[4]),
-    ]
+    brushes=[Brush(number=n, planar=p, **SETTINGS[n]) for n, p in ((1, FIRST), (4, SECOND))]
 )
 VECTOR = PatternVector((1, 4))
 
 
-def painted(name: str, heights_m, brushes, seed=0) -> Experiment:
+def painted(name: str, heights_m, brushes, seed=0):
     """A panel with a pass of each of these brushes, measured as far as they reach."""
     motion = replace(passes(heights_m, samples=300), trigger_brush=np.repeat(brushes, 2))
     reached = column(min(heights_m) - 0.35, max(heights_m) + 0.35, 30)

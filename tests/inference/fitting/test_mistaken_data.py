@@ -117,9 +117,7 @@ def test_a_target_tells_the_unit_where_the_film_alone_does_not(panels):
     mean_um = tenfold.means.mean_um.mean()
     assert said(replace(tenfold, target_um=mean_um / 10.0, tolerance_um=3.0))
     assert said(replace(tenfold, target_um=mean_um, tolerance_um=30.0)) == ()
-
-
-def test_a_model_of_another_gun_is_named_and_does_not_stop(panels):
+    # A model of another gun is named, too, and does not stop.
     ((sentence, stops),) = clean_and_fit(panels, of_level(0.3), starts=1)[0].mistakes
     assert "another gun's" in sentence
     assert not stops

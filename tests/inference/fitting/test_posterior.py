@@ -15,7 +15,6 @@ from paint_deposition.inference.fitting import posterior as jobs
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.posterior import PatternShift, draw_models, posterior_of
-from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import EFFECT_BETWEEN_JOBS, PATTERN
 
 WITH_EFFECT = FreeParameters.of(pd.DepositionModel(), CornerSlowdown(gain=0.5, length_m=0.2))
@@ -27,12 +26,7 @@ def campaign() -> pd.Campaign:
     return pd.Campaign((painted_by(pd.DepositionModel(), passes([1.0]), grid),))
 
 
-@pytest.fixture
-def panel(campaign) -> Experiment:
-    return campaign.experiments[0]
-
-
-def thicker(panel: Experiment, **settings) -> pd.Campaign:
+def thicker(panel, **settings) -> pd.Campaign:
     """Another job, painted at other settings."""
     taken = replace(panel.taken, thickness_um=panel.taken.thickness_um + 0.01)
     return pd.Campaign((replace(panel, taken=taken, settings=settings),))
@@ -67,7 +61,8 @@ def test_effects_are_told_in_their_own_units_and_the_unknown_keeps_its_weak_prio
     assert not both.factor[count:, :count].any()
 
 
-def test_no_reading_counts_twice_and_other_settings_of_the_process_are_told(panel, campaign):
+def test_no_reading_counts_twice_and_other_settings_of_the_process_are_told(campaign):
+    (panel,) = campaign.experiments
     fit = linear_fit(np.random.default_rng(4), 60)
     posterior = posterior_of(fit, campaign)
     assert posterior.readings == (panel.taken.fingerprint,)
@@ -90,27 +85,15 @@ def test_no_reading_counts_twice_and_other_settings_of_the_process_are_told(pane
         assert jobs.prior_for(posterior, thicker(panel, **settings)) == (posterior, ())
 
 
-FIT = linear_fit(np.random.default_rng(0), 20, parameters=KNOWN)
-PRIOR = KNOWN.prior
-
-
-def moved_by(away: np.ndarray) -> PatternShift:
-    """By this vector from the centre of what was known."""
-    shift = PatternShift.of(replace(FIT, vector=PRIOR.centre + away))
-    assert shift is not None
-    return shift
-
-
-def test_the_calibrated_pattern_has_not_moved_and_without_one_there_is_no_distance():
-    assert PatternShift.of(linear_fit(np.random.default_rng(0), 20, parameters=PARAMETERS)) is None
-    still = moved_by(np.zeros(len(PATTERN)))
-    assert still.distance == pytest.approx(0.0)
-    assert not still.is_alarming
-
-
 def test_jobs_that_differ_as_assumed_are_as_far_as_told():
+    fit, prior = linear_fit(np.random.default_rng(0), 20, parameters=KNOWN), KNOWN.prior
+
+    def moved_by(away: np.ndarray) -> PatternShift:
+        """By this vector from the centre of what was known."""
+        return PatternShift.of(replace(fit, vector=prior.centre + away))
+
     draws = np.random.default_rng(1).normal(size=(500, len(PATTERN)))
-    shifts = [moved_by(PRIOR.factor @ draw) for draw in draws]
+    shifts = [moved_by(prior.factor @ draw) for draw in draws]
     squares = np.array([shift.distance for shift in shifts]) ** 2
     assert kstest(squares, chi2(len(PATTERN)).cdf).pvalue > 0.01
     first = np.array([shift.by_coordinate['log_K1'] for shift in shifts])
@@ -118,7 +101,7 @@ def test_jobs_that_differ_as_assumed_are_as_far_as_told():
     assert np.mean(np.sqrt(squares) < shifts[0].usual) == pytest.approx(0.95, abs=0.03)
     assert sum(shift.is_alarming for shift in shifts) <= 5
     # A bell of another kind is warned of by what differs most.
-    other = moved_by(8.0 * PRIOR.width[4] * (np.arange(len(PATTERN)) == 4))
+    other = moved_by(8.0 * prior.width[4] * (np.arange(len(PATTERN)) == 4))
     assert other.is_alarming
     assert 'most in r_m (+8.0)' in other.warning
     assert other.to_dict()['by_coordinate']['r_m'] == pytest.approx(8.0)
@@ -136,7 +119,7 @@ def known(means: dict[str, float], deviations: dict[str, float]) -> Posterior:
     return Posterior(mean=centres, covariance=dict(zip(centres, rows.tolist(), strict=True)))
 
 
-def test_draws_near_a_bound_follow_the_truncated_normal():
+def test_draws_near_a_bound_follow_the_truncated_normal_and_none_is_beyond():
     """The mean of what is left of the normal, not that of one whose tail lies at the bound."""
     posterior = known({'K2': 0.05, GAIN: 0.1}, {'K2': 0.1, GAIN: 0.3})
     models = draw_models(MODEL, posterior, COUNT, seed=1)
@@ -148,9 +131,7 @@ def test_draws_near_a_bound_follow_the_truncated_normal():
         assert len(np.unique(values)) == COUNT
         assert values.mean() == pytest.approx(told.mean(), abs=4.0 * told.std() / COUNT**0.5)
         assert values.std() == pytest.approx(told.std(), rel=4.0 / (2 * COUNT) ** 0.5)
-
-
-def test_a_draw_is_within_its_bounds_or_refused():
+    # Each is within its bounds, or refused.
     wide = known({'K3_cos_phi': 0.7}, {'K3_cos_phi': 0.3, 'K3_sin_phi': 0.6})
     asymmetry = np.array([model.planar.K3 for model in draw_models(MODEL, wide, COUNT, seed=2)])
     assert len(np.unique(asymmetry)) == COUNT

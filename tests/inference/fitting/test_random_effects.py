@@ -14,13 +14,11 @@ from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.inference.fitting import random_effects as effects
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM, amounts
-from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import root_mean_square
 from paint_deposition.model.eq1_pattern import PATTERN
 
 
-def part(name: str, session: str | np.ndarray = '') -> Experiment:
+def part(name: str, session: str | np.ndarray = ''):
     """Read from the middle of the pass to where hardly any paint arrives."""
     places = grid_m(4, 10, 1.0, 1.5)
     one = painted_by(pd.DepositionModel(), passes([1.0]), places, name=name)
@@ -28,7 +26,7 @@ def part(name: str, session: str | np.ndarray = '') -> Experiment:
     return one.with_readings(replace(one.readings, session=sessions))
 
 
-def estimated(study: Study, change_um: np.ndarray) -> dict:
+def estimated(study, change_um: np.ndarray) -> dict:
     """Amounts of the random effects where the readings deviate so from what is known for sure."""
     nothing = np.zeros((len(study), len(PATTERN)))
     fit = fit_linear(nothing, change_um / study.sigma_um)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from paint_deposition.inference.fitting.panel import Panel, PanelFit, fit_collapse
+from paint_deposition.inference.fitting.panel import Panel, fit_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.points import SurfacePoints
 from scenes import painted, straight_pass
@@ -19,12 +19,6 @@ SHIPPED = json.loads(Path(__file__).with_name('real_profiles.json').read_text())
 def table(path: Path) -> np.ndarray:
     """(columns, N) numbers of a CSV below its header."""
     return np.loadtxt(path, delimiter=',', skiprows=1).T
-
-
-def fitted_transect(station_ft: np.ndarray, depth_in: np.ndarray) -> PanelFit:
-    """Eq. (3) fitted to a pass; feet and inches take the places of metres and micrometres."""
-    one_pass = Panel(station_ft, np.zeros(1), np.ones(1), np.zeros(1, dtype=bool), 1.0, 0.0)
-    return fit_collapse(one_pass, depth_in, np.full(len(depth_in), 0.05))
 
 
 def fitted_spot(radius_m: np.ndarray, thickness: np.ndarray) -> PlanarPattern:
@@ -57,13 +51,11 @@ def share_on_the_axis(angle_deg: np.ndarray) -> np.ndarray:
     return film.film_um / film.film_um.max()
 
 
-def test_eq2_on_the_axis_is_the_cosine_that_the_coating_follows():
-    angle = np.array([90.0, 75.0, 60.0, 45.0, 29.0])
-    np.testing.assert_allclose(share_on_the_axis(angle), np.sin(np.radians(angle)), rtol=1e-12)
-
-
 def test_eqs_1_and_3_follow_a_static_spot_and_a_moving_sprinkler(shared_data):
-    found = fitted_transect(*table(shared_data / 'travelling_gun_transect_1d_collapse.csv'))
+    # Feet and inches take the places of metres and micrometres.
+    station_ft, depth_in = table(shared_data / 'travelling_gun_transect_1d_collapse.csv')
+    one_pass = Panel(station_ft, np.zeros(1), np.ones(1), np.zeros(1, dtype=bool), 1.0, 0.0)
+    found = fit_collapse(one_pass, depth_in, np.full(len(depth_in), 0.05))
     assert found.collapse.model_dump() == pytest.approx(SHIPPED['eq3'], rel=1e-4, abs=1e-9)
     _, radius_mm, thickness = table(shared_data / 'magnetron_static_radial_130mm.csv')
     thickness = thickness / 100.0

@@ -1,6 +1,4 @@
-"""Repeats: the noise they show and outliers among them; readings on the surface."""
-
-from collections.abc import Iterator
+"""Repeats: the noise they show, and outliers among them; where readings lie, and may lie."""
 
 import numpy as np
 import pytest
@@ -9,30 +7,17 @@ import paint_deposition as pd
 from booth import panel, path_of, serpentine
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.readings import gauge_noise as repeats
+from paint_deposition.inference.readings import places as on_part
 from paint_deposition.inference.readings import readings as taken
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.gauge_noise import gauge_noise, gross_outliers
-from paint_deposition.inference.readings.places import columns_or_rows, unit_in_doubt
 from paint_deposition.inference.readings.readings import PointMeans, Residuals
 from paint_deposition.motion.path import SprayPath
-
-# Numbers of readings at each point.
-LAYOUTS = {'20 pairs': [2] * 20, 'mixed': [1] * 30 + [2] * 10 + [3] * 5 + [5] * 2}
-CAMPAIGNS = 100
+from surfaces import refined
 
 
 def usual_noise_um(film_um: np.ndarray) -> np.ndarray:
     return np.hypot(0.7, 0.01 * film_um)
-
-
-def campaigns(layout: str, random) -> Iterator[tuple[pd.Readings, np.ndarray]]:
-    """Readings of 20 to 60 um with the usual noise, and the film below them."""
-    counts = LAYOUTS[layout]
-    owner = np.repeat(np.arange(len(counts)), counts)
-    film = np.linspace(20.0, 60.0, len(counts))[owner]
-    for _ in range(CAMPAIGNS):
-        thickness = film + usual_noise_um(film) * random.normal(size=len(owner))
-        yield pd.Readings.of(np.zeros((len(owner), 3)), thickness, point=owner.astype(str)), film
 
 
 def at_points(points: str, thickness_um, sigma_um=np.nan) -> pd.Readings:
@@ -49,13 +34,15 @@ def honest_pairs(count: int = 10, sigma_um: float = 0.7) -> tuple[str, list[floa
     return ''.join(2 * chr(ord('A') + k) for k in range(count)), thickness.tolist()
 
 
-@pytest.mark.parametrize('layout', LAYOUTS)
-def test_normal_readings_stay_and_their_noise_is_unbiased(layout):
+@pytest.mark.parametrize('counts', [[2] * 20, [1] * 30 + [2] * 10 + [3] * 5 + [5] * 2])
+def test_normal_readings_stay_and_their_noise_is_unbiased(counts):
     """100 campaigns with 20 degrees of freedom or more know a standard deviation to 1.6 %."""
-    random = np.random.default_rng(3)
+    random, owner = np.random.default_rng(3), np.repeat(np.arange(len(counts)), counts)
+    film, places = np.linspace(20.0, 60.0, len(counts))[owner], np.zeros((len(owner), 3))
     squares, dropped = [], []
-    for readings, film in campaigns(layout, random):
-        noise = gauge_noise(readings)
+    for _ in range(100):
+        thickness = film + usual_noise_um(film) * random.normal(size=len(owner))
+        noise = gauge_noise(pd.Readings.of(places, thickness, point=owner.astype(str)))
         squares.append(np.mean((noise.sigma_um / usual_noise_um(film)) ** 2))
         dropped.append(noise.gross.mean())
     assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.05)
@@ -188,7 +175,7 @@ def test_the_cause_is_named_with_both_boxes(positions_m, words):
 )  # fmt: skip
 def test_a_guessed_unit_is_doubted_where_another_fits(factor, guessed, words):
     readings = pd.Readings.of(factor * PLACES_M, np.full(4, 20.0), unit_is_guessed=guessed)
-    doubt = unit_in_doubt(panel(), readings)
+    doubt = on_part.unit_in_doubt(panel(), readings)
     assert words in doubt
     assert bool(doubt) == bool(words)
 
@@ -225,5 +212,44 @@ X, Z = np.linspace(-0.4, 0.4, 9), np.linspace(-0.4, 0.4, 8)
     ids=['grid', 'by hand', 'rows', 'one line', 'stray', *5 * ['scattered']],
 )  # fmt: skip
 def test_a_grid_is_read_across_the_passes(places, lines):
-    labels = columns_or_rows(panel(), path_of(serpentine()), places)
+    labels = on_part.columns_or_rows(panel(), path_of(serpentine()), places)
     assert labels.tolist() == [label for label, count in lines for _ in range(count)]
+
+
+def folded(slope: float) -> pd.Surface:
+    """A sheet with a bend along z at x = 0, its radius 40 mm over the slope where it is slight."""
+    return refined(lambda x, z: slope * 0.01 * np.logaddexp(0.0, x / 0.01), 0.01, 0.02)
+
+
+def test_a_foot_keeps_off_edges_and_does_not_stand_on_a_bend():
+    inside = np.abs(panel().vertices_m[:, [0, 2]]).max(axis=1) < 0.5 - 0.03
+    np.testing.assert_array_equal(on_part.can_stand(panel(), 0.03), inside)
+    surface = folded(1.2)
+    x = surface.vertices_m[:, 0]
+    standing = on_part.can_stand(surface)
+    assert not standing[np.abs(x) < 0.005].any()
+    assert standing[(np.abs(x) > 0.1) & (np.abs(x) < 0.17)].any()
+    assert on_part.can_stand(folded(0.1))[np.abs(x) < 0.005].any()
+
+
+def test_spread_places_are_about_as_many_as_wanted_and_apart_and_those_of_a_grid_exactly():
+    surface = panel()
+    usable = surface.vertices_m[:, 0] > 0.0
+    rows = on_part.spread_places(surface, usable, 100, seed=1)
+    assert usable[rows].all()
+    assert 80 < len(rows) < 120
+    positions = surface.vertices_m[rows]
+    distance = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2) + np.eye(len(rows))
+    assert distance.min() > 0.05
+    rows = on_part.grid_places(surface, on_part.can_stand(surface), 25)
+    assert len(set(rows)) == 25
+    face = on_part.from_edges_m(surface, surface.vertices_m[rows])
+    # Five rows and five columns, to the spacing of the vertices.
+    for axis in range(2):
+        assert np.count_nonzero(np.diff(np.sort(face[:, axis])) > 0.1) == 4
+    # Places on a face are found again.
+    surface = folded(0.3)
+    at = np.array([[0.05, 0.1], [0.21, 0.33], [0.3, 0.02]])
+    points, hit = on_part.on_face_m(surface, at)
+    assert hit.all()
+    np.testing.assert_allclose(on_part.from_edges_m(surface, points), at, atol=1e-9)
