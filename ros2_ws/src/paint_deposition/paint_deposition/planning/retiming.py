@@ -14,7 +14,7 @@ from paint_deposition.planning.nodes import FilmAtPoints, Nodes, retime, speed_b
 from paint_deposition.planning.passes import PlannedPass
 from paint_deposition.planning.planned_film import WantedFilm, stratified_sample
 from paint_deposition.planning.programme import Opening, Programme, moves_of
-from paint_deposition.planning.quadratic_program import Density, Problem, solve
+from paint_deposition.planning.quadratic_program import Problem, solve
 from paint_deposition.planning.requests import ImproveRequest, PlanRequest
 
 # Rounds of the solver where an approximate solution is enough: triggers, and the cost of limits.
@@ -66,31 +66,27 @@ def retime_for_evenness(
     narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
     # Nodes per width of the pattern, within bounds.
     spacing_m = min(max(narrow / 2.0, 0.015), 0.05)
-    flow = np.array([opening.flow for opening in original.openings])
+    given_flow = np.array([opening.flow for opening in original.openings])
     lengths_m = np.diff(original.ends_m)[:, 0]
     seconds, level = np.diff(original.seconds_at(original.ends_m))[:, 0], target_um / mean_um
+    fastest, slowest = request.speed_max_m_per_s, request.speed_min_m_per_s
+    # (m,) density of paint that is the original mean of each opening.
+    even = given_flow * np.clip(level * seconds / lengths_m, 1.0 / fastest, 1.0 / slowest)
 
-    def timed_at(nodes: Nodes, density: Density) -> Programme:
-        flows = zip(nodes.openings, density.flow.tolist(), strict=True)
-        openings = tuple(replace(opening, flow=flow) for opening, flow in flows)
+    def timed_at(nodes: Nodes, density: np.ndarray, flow: np.ndarray) -> Programme:
+        flows = zip(nodes.openings, flow.tolist(), strict=True)
+        openings = tuple(replace(opening, flow=own) for opening, own in flows)
         programme = replace(original, openings=openings)
-        return retime(programme, nodes, density.slowness(nodes), request)
+        return retime(programme, nodes, density / flow[nodes.opening], request)
 
     def problem_about(
-        nodes: Nodes, density: Density | None, open_ends: np.ndarray
-    ) -> tuple[Problem, Density]:
-        """The problem about a density; without one, about the original mean of each opening."""
+        nodes: Nodes, density: np.ndarray, flow: np.ndarray, open_ends: np.ndarray
+    ) -> Problem:
         bounds = speed_bounds(replace(original, openings=nodes.openings), nodes, request)
-        if density is None:
-            fastest, slowest = request.speed_max_m_per_s, request.speed_min_m_per_s
-            slowness = np.clip(level * seconds / lengths_m, 1.0 / fastest, 1.0 / slowest)
-            density = Density((flow * slowness)[nodes.opening], flow)
-        timed = timed_at(nodes, density)
-        of_nodes = [one.of_nodes(timed, nodes, density.density) for one in films]
-        sprayed_s = level * float(flow @ seconds)
-        return Problem(
-            of_nodes, target_um, bands, nodes, bounds, request, sprayed_s, open_ends
-        ), density
+        timed = timed_at(nodes, density, flow)
+        of_nodes = [one.of_nodes(timed, nodes, density) for one in films]
+        sprayed_s = level * float(given_flow @ seconds)
+        return Problem(of_nodes, target_um, bands, nodes, bounds, request, sprayed_s, open_ends)
 
     # Choose where the gun opens; then solve and simulate in turn until both films agree.
     progress('triggers', 0.0)
@@ -98,40 +94,41 @@ def retime_for_evenness(
     nodes = Nodes.of(widened(original, request), spacing_m)
     open_ends = _may_be_closed(nodes, openings, request)
     if open_ends.any():
-        relaxed, density = problem_about(nodes, None, open_ends)
-        density = solve(relaxed, density, ROUGH_ROUNDS)
-        openings = _openings(relaxed, density.density, openings)
-        free = [(relaxed, density)]
+        start = even[nodes.opening], given_flow
+        relaxed = problem_about(nodes, *start, open_ends)
+        density, flow, _ = solve(relaxed, *start, ROUGH_ROUNDS)
+        openings = _openings(relaxed, density, openings)
+        free = [(relaxed, density, flow)]
     nodes = Nodes.of(openings, spacing_m)
     closed = np.zeros(len(nodes), dtype=bool)
-    found: Density | None = None
-    rounds = 4
+    density, flow, rounds = even[nodes.opening], given_flow, 4
     for round_ in range(rounds):
         progress('speeds', round_ / rounds)
-        problem, start = problem_about(nodes, found, closed)
-        found = solve(problem, start)
-        timed = timed_at(nodes, found)
+        problem = problem_about(nodes, density, flow, closed)
+        density, flow, binding = solve(problem, density, flow)
+        timed = timed_at(nodes, density, flow)
         laid = [one.film_um(timed) for one in films]
-        expected = problem.films_um(found)
+        expected = problem.films_um(density)
         off = max(float(np.abs(a - b).max()) for a, b in zip(expected, laid, strict=True))
         # The film of the solution and that of the timed programme agree.
         if off <= 5e-4 * target_um:
             break
-    assert found is not None
     limits: dict[str, float] = {}
     of_path = now = _sigma_n(laid)
     if explain:
-        for number, name in enumerate(found.binding):
-            progress('limits', number / len(found.binding))
+        for number, name in enumerate(binding):
+            progress('limits', number / len(binding))
             freed = replace(problem, left_out=frozenset({name}))
-            without = _sigma_n(freed.films_um(solve(freed, found, ROUGH_ROUNDS)))
+            without = _sigma_n(freed.films_um(solve(freed, density, flow, ROUGH_ROUNDS)[0]))
             # A limit is reported if sigma_n would be lower by 2 % without it.
             if without < 0.98 * now:
                 limits[name] = without
         limits = dict(sorted(limits.items(), key=lambda limit: limit[1]))
-        for one, start in ((problem.relaxed(), found), *((one.relaxed(), s) for one, s in free)):
-            of_path = min(of_path, _sigma_n(one.films_um(solve(one, start, ROUGH_ROUNDS))))
-    return Retiming(original, timed, target_um, found.binding, limits, of_path)
+        for one, near, given in ((problem, density, flow), *free):
+            bare = one.relaxed()
+            most_even, *_ = solve(bare, near, given, ROUGH_ROUNDS)
+            of_path = min(of_path, _sigma_n(bare.films_um(most_even)))
+    return Retiming(original, timed, target_um, binding, limits, of_path)
 
 
 def timed_evenly(
