@@ -142,7 +142,7 @@ class Improvement:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong, a line each with its likely cause."""
-        found = [*self.geometry_warnings, *map(str, self.drive.limits if self.drive else ())]
+        found = [*self.geometry_warnings, *(self.drive.limits if self.drive else ())]
         found += self.wanted.doubts(self.after.statistics)
         target_um = self.retiming.target_um
         off = self.after.mean_um / target_um - 1.0

@@ -294,7 +294,7 @@ class PlannedFilm(LaidFilm):
         slowed = bool(self.drive and self.drive.limits)
         # A mean film this close to the target is on it; speeds this close to a limit keep it.
         near = 0.01
-        yield from map(str, self.drive.limits if self.drive else ())
+        yield from self.drive.limits if self.drive else ()
         yield from map(str, self.contacts)
         yield from self.wanted.doubts(self.statistics)
         if target and not self.wanted.zones and abs(self.mean_um / target - 1.0) > near:
