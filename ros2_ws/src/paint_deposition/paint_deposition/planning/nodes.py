@@ -179,8 +179,7 @@ class FilmAtPoints:
         # The opening that each sub-step belongs to: the last that has begun.
         begun = np.searchsorted(programme.ends_m[:, 0], travel, side='right')
         sprayed, rows = self._integrator.sprayed(path)
-        ends = np.array([[one.on_m, one.off_m] for one in nodes.openings])
-        inside = np.clip(travel[rows], *ends[np.maximum(begun - 1, 0)[rows]].T)
+        inside = np.clip(travel[rows], *programme.ends_m[np.maximum(begun - 1, 0)[rows]].T)
         # (M, n) weights of the nodes at the sub-steps.
         hats = BSpline.design_matrix(inside, np.pad(nodes.travel_m, 1, 'edge'), 1)
         shares = hats.multiply(1.0 / (hats @ density)[:, np.newaxis]).tocsc()

@@ -114,22 +114,21 @@ def plan(
     axes = pass_axes(surface, request.direction, request.outward)
     surface_map = SurfaceMap(surface, axes, request.smoothing_radius_m)
     wanted = WantedFilm.of(surface, surface_map.painted, request.target_um, zones)
-    (left, right), ends = surface_map.extent_m.tolist()
-    height = ends[1] - ends[0]
+    width, height = np.ptp(surface_map.extent_m, axis=1).tolist()
     # Speeds along the passes may make a film even that is not at one speed.
     tolerance = None if request.optimise else request.tolerance
     even = request.model_copy(update={'target_um': wanted.target_um, 'tolerance': tolerance})
     try:
-        plane = recommend(model, even.for_plane(height, right - left))
+        plane = recommend(model, even.for_plane(height, width))
     except PlanError:  # a part may keep to a tolerance that no plane keeps to
         anyhow = even.model_copy(update={'tolerance': None})
-        plane = recommend(model, anyhow.for_plane(height, right - left))
+        plane = recommend(model, anyhow.for_plane(height, width))
     style = _style(model, request, plane)
     films = LineFilms(
         surface, surface_map, model, style, plane.curve.parallel.first.finest_m,
         0.5 * plane.sb50_m, lambda share: progress('single passes', share),
     )  # fmt: skip
-    placement = place_passes(films, ends, request.index_range_m(plane.index_m), tolerance)
+    placement = place_passes(films, request.index_range_m(plane.index_m), tolerance)
     target = None if request.speed_m_per_s else wanted.target_um
     rounds = 4
     for round_ in range(rounds):
@@ -189,13 +188,12 @@ def optimise(
     target = unoptimised.wanted.target_um or unoptimised.mean_um
     areas_m2 = unoptimised.surface.vertex_areas_m2
     wanted_cm3 = target * float(areas_m2[unoptimised.wanted.region].sum())
-    low, high = unoptimised.line_films.surface_map.extent_m[1].tolist()
     index_range_m = request.index_range_m(unoptimised.plane.index_m)
     placements = [unoptimised.placement]
     # From two passes fewer than in the unoptimised plan to one more.
     for passes in range(max(1, count - 2), count + 2):
         if passes != count:
-            placement = best_placement(unoptimised.line_films, (low, high), index_range_m, passes)
+            placement = best_placement(unoptimised.line_films, index_range_m, passes)
             placements += [placement] if placement else []
     tried = []
     for number, placement in enumerate(sorted(placements, key=lambda one: one.passes)):
