@@ -15,7 +15,7 @@ from paint_deposition.planning.passes import PlannedPass
 from paint_deposition.planning.planned_film import WantedFilm, stratified_sample
 from paint_deposition.planning.programme import Opening, Programme, moves_of
 from paint_deposition.planning.quadratic_program import Problem, solve
-from paint_deposition.planning.requests import ImproveRequest, PlanRequest
+from paint_deposition.planning.requests import ImproveRequest, PlanRequest, SpeedLimits
 
 # Rounds of the solver where an approximate solution is enough: triggers, and the cost of limits.
 ROUGH_ROUNDS = 3
@@ -149,10 +149,16 @@ def timed_evenly(
     for the time that they spray over the cycle time of the plan to begin with.
     """
     sprayed_s = sum((one.off_m - one.on_m) / one.speed_m_per_s for one in passes)
-    asked = request.improvement(
-        passes[0].style.overspray_m, target_um,
-        paint=model.planar.K1_cm3_per_s * sprayed_s / wanted_cm3, time=sprayed_s / cycle_time_s,
-    )  # fmt: skip
+    sprayed_cm3 = model.planar.K1_cm3_per_s * sprayed_s
+    names = (*SpeedLimits.model_fields, 'acceleration_m_per_s2')
+    asked = ImproveRequest(
+        **{name: getattr(request, name) for name in names},
+        target_um=target_um,
+        # The gun may be closed up to the edge of the part.
+        trigger_cut_m=passes[0].style.overspray_m,
+        paint_weight=sprayed_cm3 / wanted_cm3 * request.paint_weight,
+        time_weight=sprayed_s / cycle_time_s * request.time_weight,
+    )
     original = Programme.of(trajectory)
     retimed = retime_for_evenness(
         surface, wanted, original, [model], asked, progress, explain=False
