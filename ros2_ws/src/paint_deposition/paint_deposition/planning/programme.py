@@ -55,6 +55,9 @@ class Programme:
     def of(trajectory: Trajectory, max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S) -> 'Programme':
         """From a motion as recorded or programmed.
 
+        Gaps between poses close the gun. Flows that change while it is open are taken as their
+        mean over time.
+
         Raises:
             PlanError: the gun never sprays on a move, or its clock goes back in between.
         """
@@ -68,14 +71,29 @@ class Programme:
             )
         steps_m = np.linalg.norm(np.diff(poses.positions_m, axis=0), axis=1)
         travel = np.append(0.0, np.cumsum(steps_m))
-        seconds = (poses.stamps_ns - poses.stamps_ns[0]) * 1e-9
-        programme = Programme(
-            poses.positions_m, poses.quaternions_xyzw, travel, np.diff(seconds),
-            _openings(trajectory, poses.stamps_ns, travel, max_pose_gap_s), trajectory,
-        )  # fmt: skip
-        if not programme.openings:
+        since_ns = poses.stamps_ns - poses.stamps_ns[0]
+        path, _ = spray_path(trajectory, max_pose_gap_s, whole_strokes=False)
+        half_ns = np.rint(0.5e9 * path.dwell_s).astype(np.int64)
+        edges_ns = np.stack([path.stamp_ns - half_ns, path.stamp_ns + half_ns])
+        edges_ns -= poses.stamps_ns[0]
+        on_m, off_m = np.interp(edges_ns, since_ns, travel)
+        sprays = path.flow > 0.0
+        breaks = (sprays[1:] != sprays[:-1]) | (path.brush[1:] != path.brush[:-1])
+        # The halves of two sub-steps are rounded, each to a nanosecond.
+        # Sub-steps this close in time follow each other.
+        breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > 4
+        openings = []
+        for rows in filter(len, np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks))):
+            on, off = float(on_m[rows[0]]), float(off_m[rows[-1]])
+            if sprays[rows[0]] and off - on > STANDING_M:
+                flow = float(np.average(path.flow[rows], weights=path.dwell_s[rows]))
+                openings.append(Opening(on, off, flow, int(path.brush[rows[0]])))
+        if not openings:
             raise PlanError(f'{trajectory.source}: the gun never sprays on a move')
-        return programme
+        return Programme(
+            poses.positions_m, poses.quaternions_xyzw, travel, np.diff(since_ns * 1e-9),
+            tuple(openings), trajectory,
+        )  # fmt: skip
 
     @cached_property
     def clock_s(self) -> np.ndarray:
@@ -209,31 +227,6 @@ def closed_beside(programme: Programme, surface: Surface) -> Programme:
             ]
             openings = tuple(one for one in pieces if one.off_m - one.on_m > STANDING_M)
     return replace(programme, openings=openings)
-
-
-def _openings(
-    trajectory: Trajectory, stamps_ns: np.ndarray, travel_m: np.ndarray, max_pose_gap_s: float
-) -> tuple[Opening, ...]:
-    """Where the gun is open on the way; gaps between poses close it.
-
-    Flows that change while it is open are taken as their mean over time.
-    """
-    path, _ = spray_path(trajectory, max_pose_gap_s, whole_strokes=False)
-    half_ns, first_ns = np.rint(0.5e9 * path.dwell_s).astype(np.int64), stamps_ns[0]
-    edges_ns = np.stack([path.stamp_ns - half_ns, path.stamp_ns + half_ns]) - first_ns
-    on_m, off_m = np.interp(edges_ns, stamps_ns - first_ns, travel_m)
-    sprays = path.flow > 0.0
-    breaks = (sprays[1:] != sprays[:-1]) | (path.brush[1:] != path.brush[:-1])
-    # The halves of two sub-steps are rounded, each to a nanosecond.
-    # Sub-steps this close in time follow each other.
-    breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > 4
-    openings = []
-    for rows in filter(len, np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks))):
-        on, off = float(on_m[rows[0]]), float(off_m[rows[-1]])
-        if sprays[rows[0]] and off - on > STANDING_M:
-            flow = float(np.average(path.flow[rows], weights=path.dwell_s[rows]))
-            openings.append(Opening(on, off, flow, int(path.brush[rows[0]])))
-    return tuple(openings)
 
 
 def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:

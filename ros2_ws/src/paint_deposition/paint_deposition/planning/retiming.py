@@ -92,12 +92,17 @@ def retime_for_evenness(
     progress('triggers', 0.0)
     openings, free = original.openings, []
     nodes = Nodes.of(widened(original, request), spacing_m)
-    open_ends = _may_be_closed(nodes, openings, request)
+    # (m, 2) latest place at which each opening may begin, and earliest at which it may end: it is
+    # not cut to less than 30 % of its length.
+    cut_m = np.minimum(request.trigger_cut_m, 0.35 * lengths_m)
+    kept_m = original.ends_m + np.outer(cut_m, [1.0, -1.0])
+    latest_m, earliest_m = kept_m[nodes.opening].T
+    open_ends = (nodes.travel_m < latest_m) | (nodes.travel_m > earliest_m)
     if open_ends.any():
         start = even[nodes.opening], given_flow
         relaxed = problem_about(nodes, *start, open_ends)
         density, flow, _ = solve(relaxed, *start, ROUGH_ROUNDS)
-        openings = _openings(relaxed, density, openings)
+        openings = _openings(relaxed, density, kept_m)
         free = [(relaxed, density, flow)]
     nodes = Nodes.of(openings, spacing_m)
     closed = np.zeros(len(nodes), dtype=bool)
@@ -210,40 +215,21 @@ def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -
     return float(way[np.argmin(good)] if not good.all() else way[-1])
 
 
-def _may_be_closed(
-    nodes: Nodes, original: tuple[Opening, ...], request: ImproveRequest
-) -> np.ndarray:
-    """(n,) bool, nodes so near the original ends that the gun may be closed there."""
-    near = np.zeros(len(nodes), dtype=bool)
-    if not request.trigger_cut_m and not request.trigger_shift_m:
-        return near
-    for number, opening in enumerate(original):
-        rows = nodes.rows(number)
-        place, (first, last) = nodes.travel_m[rows], _kept_m(opening, request)
-        near[rows] = (place < first) | (place > last)
-    return near
+def _openings(relaxed: Problem, density: np.ndarray, kept_m: np.ndarray) -> tuple[Opening, ...]:
+    """Openings that begin and end where the relaxed density reaches half of the least possible.
 
-
-def _kept_m(opening: Opening, request: ImproveRequest) -> tuple[float, float]:
-    """Latest place at which an opening may begin, and earliest at which it may end."""
-    # An opening is not cut to less than 30 % of its length.
-    cut = min(request.trigger_cut_m, 0.35 * (opening.off_m - opening.on_m))
-    return opening.on_m + cut, opening.off_m - cut
-
-
-def _openings(
-    relaxed: Problem, density: np.ndarray, original: tuple[Opening, ...]
-) -> tuple[Opening, ...]:
-    """Openings that begin and end where the relaxed density reaches half of the least possible."""
+    Of each, (m, 2) the latest place to begin and the earliest to end are given.
+    """
     found, nodes = [], relaxed.nodes
-    for number, opening in enumerate(nodes.openings):
+    for number, (opening, (latest, earliest)) in enumerate(
+        zip(nodes.openings, kept_m.tolist(), strict=True)
+    ):
         rows = nodes.rows(number)
         place = nodes.travel_m[rows]
         least = opening.flow / relaxed.bounds[0][rows]
         worth = (density[rows] - 0.5 * least) / least
         kept = np.flatnonzero(~relaxed.open_ends[rows] | (worth > 0.0))
         first, last = int(kept[0]), int(kept[-1])
-        latest, earliest = _kept_m(original[number], relaxed.request)
         on = min(_crossing_m(place, worth, first, first - 1), latest)
         off = max(_crossing_m(place, worth, last, last + 1), earliest)
         found.append(replace(opening, on_m=on, off_m=off))

@@ -70,7 +70,7 @@ class DepositionSimulator(PaintingNode):
         self.display = FilmDisplay(self)
         self.parts = PartChange(self, version, self._saving, saving)
         self.publish()
-        return {**tasks, 'film': self.display.film_status, 'part': self.parts.status}
+        return {**tasks, 'part': self.parts.status}
 
     def _cleanup(self) -> None:
         self.parts.close()

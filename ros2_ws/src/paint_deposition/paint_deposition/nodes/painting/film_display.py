@@ -25,12 +25,11 @@ from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FIGURES, FilmStatistics, film_statistics
 from paint_deposition.nodes import topics
-from paint_deposition.nodes.node import OK, WARN, Status
+from paint_deposition.nodes.node import OK, WARN
 from paint_deposition.nodes.painting.atomizer_input import LONGEST_NAME, MOST_NAMES
 from paint_deposition.nodes.painting.health import (
     DOUBTFUL,
     UNPAINTED,
-    film_status,
     sprays_without_poses,
     what_was_wrong,
 )
@@ -174,13 +173,6 @@ class FilmDisplay:
             node.create_subscription(PoseProgress, topic, take, topics.PROGRESS)
         node.create_steady_timer(0.5, self._publish_trust)
 
-    def film_status(self) -> Status:
-        """The status of the film, and the share that each gun has in it."""
-        level, words, values = film_status(self._node)
-        parts = zip(self._stats.atomizers, self._stats.atomizer_share, strict=True)
-        each = {f'share of {gun}': f'{share:.1%}' for gun, share in parts if gun}
-        return level, words, {**values, **each}
-
     def _take_report(self, gun: str, report: PoseProgress) -> None:
         key = gun, report.reporter[:LONGEST_NAME]
         own = report.reporter == self._node.get_fully_qualified_name()
@@ -259,6 +251,7 @@ class FilmDisplay:
             atomizer_share=shares,
             **{name: getattr(figures, name) for name in FIGURES},
         )
+        node.shares = dict(zip(node.gun_names, shares, strict=True))
         self._counts = None
         self._scale = film_scale(self._film_um, values['color_min_um'], values['color_max_um'])
         ends = self._scale.low, self._scale.high
