@@ -35,6 +35,7 @@ class Problem:
     films: Sequence[np.ndarray]
     target_um: float  # film wanted
     bands: Sequence[Band]  # of the points
+    given_flow: np.ndarray  # (m,) of each opening in the original programme
     # Of the path.
     nodes: Nodes
     bounds: tuple[np.ndarray, np.ndarray]  # greatest speeds and their limits, see speed_bounds
@@ -92,7 +93,7 @@ def solve(
         costly = names[multipliers * float(values[:count].mean()) > 1e-6]
         flow, limits = values[count:], LIMITS
         if least >= most:
-            flow, limits = problem.nodes.given_flow, LIMITS - {FLOW}
+            flow, limits = problem.given_flow, LIMITS - {FLOW}
         binding = tuple(name for name in dict.fromkeys(costly.tolist()) if name in limits)
         before, density = density, np.maximum(values[:count], 0.0)
         if np.abs(density - before).max() / np.abs(density).max() < 3e-3:
@@ -106,7 +107,7 @@ def _objective(
     """Matrix and vector of x'Mx / 2 + v'x: evenness, hinges, paint, time, smoothness, flows."""
     nodes, request, count = problem.nodes, problem.request, len(problem.nodes)
     # The unknowns are densities, and a flow for each opening.
-    size = count + len(nodes.openings)
+    size = count + len(flow)
     matrix, linear = np.zeros((size, size)), np.zeros(size)
     share = 2.0 / (len(problem.films) * problem.films[0].shape[1])
     # The mean of the best known film is held at the target by this weight. The levels of the
@@ -166,7 +167,7 @@ def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float
 def _constraints(problem: Problem, density: np.ndarray, flow: np.ndarray) -> Constraints:
     slowness = density / flow[problem.nodes.opening]
     nodes, limits, count = problem.nodes, problem.request, len(problem.nodes)
-    unit = identity(count + len(nodes.openings), format='csr')
+    unit = identity(count + len(flow), format='csr')
     # At each node: the density, and the flow of its opening.
     y, f, closable = unit[:count], unit[count + nodes.opening], problem.open_ends
     greatest, limited_by = problem.bounds
@@ -198,8 +199,8 @@ def _constraints(problem: Problem, density: np.ndarray, flow: np.ndarray) -> Con
     bend = y[inner + 1] - 2.0 * y[inner] + y[inner - 1]
     most = diags(4.0 * reach * ratio**3) @ y[inner] - diags(3.0 * reach * ratio**4) @ f[inner]
     rows += [(JERK, bend - most, none), (JERK, -bend - most, none)]
-    rows.append((FLOW, unit[count:], limits.flow[1] * nodes.given_flow))
-    rows.append((FLOW, -unit[count:], -limits.flow[0] * nodes.given_flow))
+    rows.append((FLOW, unit[count:], limits.flow[1] * problem.given_flow))
+    rows.append((FLOW, -unit[count:], -limits.flow[0] * problem.given_flow))
     names, matrices, ends = zip(
         *(row for row in rows if row[1].shape[0] and row[0] not in problem.left_out), strict=True
     )

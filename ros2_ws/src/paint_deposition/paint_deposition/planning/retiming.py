@@ -13,7 +13,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.nodes import FilmAtPoints, Nodes, retime, speed_bounds
 from paint_deposition.planning.passes import PlannedPass
 from paint_deposition.planning.planned_film import WantedFilm, stratified_sample
-from paint_deposition.planning.programme import Opening, Programme, moves_of
+from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.quadratic_program import Problem, solve
 from paint_deposition.planning.requests import ImproveRequest, PlanRequest, SpeedLimits
 
@@ -66,32 +66,32 @@ def retime_for_evenness(
     narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
     # Nodes per width of the pattern, within bounds.
     spacing_m = min(max(narrow / 2.0, 0.015), 0.05)
-    given_flow = np.array([opening.flow for opening in original.openings])
     lengths_m = np.diff(original.ends_m)[:, 0]
     seconds, level = np.diff(original.seconds_at(original.ends_m))[:, 0], target_um / mean_um
     fastest, slowest = request.speed_max_m_per_s, request.speed_min_m_per_s
     # (m,) density of paint that is the original mean of each opening.
-    even = given_flow * np.clip(level * seconds / lengths_m, 1.0 / fastest, 1.0 / slowest)
+    even = original.flow * np.clip(level * seconds / lengths_m, 1.0 / fastest, 1.0 / slowest)
 
     def timed_at(nodes: Nodes, density: np.ndarray, flow: np.ndarray) -> Programme:
-        flows = zip(nodes.openings, flow.tolist(), strict=True)
-        openings = tuple(replace(opening, flow=own) for opening, own in flows)
-        programme = replace(original, openings=openings)
+        programme = replace(original, ends_m=nodes.ends_m, flow=flow)
         return retime(programme, nodes, density / flow[nodes.opening], request)
 
     def problem_about(
         nodes: Nodes, density: np.ndarray, flow: np.ndarray, open_ends: np.ndarray
     ) -> Problem:
-        bounds = speed_bounds(replace(original, openings=nodes.openings), nodes, request)
+        bounds = speed_bounds(replace(original, ends_m=nodes.ends_m), nodes, request)
         timed = timed_at(nodes, density, flow)
         of_nodes = [one.of_nodes(timed, nodes, density) for one in films]
-        sprayed_s = level * float(given_flow @ seconds)
-        return Problem(of_nodes, target_um, bands, nodes, bounds, request, sprayed_s, open_ends)
+        sprayed_s = level * float(original.flow @ seconds)
+        return Problem(
+            of_nodes, target_um, bands, original.flow, nodes, bounds, request, sprayed_s,
+            open_ends,
+        )  # fmt: skip
 
     # Choose where the gun opens; then solve and simulate in turn until both films agree.
     progress('triggers', 0.0)
-    openings, free = original.openings, []
-    nodes = Nodes.of(widened(original, request), spacing_m)
+    ends_m, free = original.ends_m, []
+    nodes = Nodes.of(_widened_m(original, request), spacing_m)
     # (m, 2) latest place at which each opening may begin, and earliest at which it may end: it is
     # not cut to less than 30 % of its length.
     cut_m = np.minimum(request.trigger_cut_m, 0.35 * lengths_m)
@@ -99,14 +99,14 @@ def retime_for_evenness(
     latest_m, earliest_m = kept_m[nodes.opening].T
     open_ends = (nodes.travel_m < latest_m) | (nodes.travel_m > earliest_m)
     if open_ends.any():
-        start = even[nodes.opening], given_flow
+        start = even[nodes.opening], original.flow
         relaxed = problem_about(nodes, *start, open_ends)
         density, flow, _ = solve(relaxed, *start, ROUGH_ROUNDS)
-        openings = _openings(relaxed, density, kept_m)
+        ends_m = _ends_m(relaxed, density, kept_m)
         free = [(relaxed, density, flow)]
-    nodes = Nodes.of(openings, spacing_m)
+    nodes = Nodes.of(ends_m, spacing_m)
     closed = np.zeros(len(nodes), dtype=bool)
-    density, flow, rounds = even[nodes.opening], given_flow, 4
+    density, flow, rounds = even[nodes.opening], original.flow, 4
     for round_ in range(rounds):
         progress('speeds', round_ / rounds)
         problem = problem_about(nodes, density, flow, closed)
@@ -179,21 +179,18 @@ def _sigma_n(films_um: Sequence[np.ndarray]) -> float:
 # --- where the gun opens and closes: the ends of the openings, from a relaxed problem
 
 
-def widened(programme: Programme, request: ImproveRequest) -> tuple[Opening, ...]:
-    """The openings with all places at which the gun might open earlier or close later."""
-    found = []
-    last = len(programme.openings) - 1
-    for number, (opening, around) in enumerate(
-        zip(programme.openings, programme.around_m.tolist(), strict=True)
-    ):
-        # Two openings may meet half way between them.
-        back = (0.5 if number else 1.0) * (opening.on_m - around[0])
-        ahead = (0.5 if number < last else 1.0) * (around[1] - opening.off_m)
-        back, ahead = (min(request.trigger_shift_m, room) for room in (back, ahead))
-        on = opening.on_m - _usable_m(programme, opening.on_m, -1.0, back)
-        off = opening.off_m + _usable_m(programme, opening.off_m, 1.0, ahead)
-        found.append(replace(opening, on_m=on, off_m=off))
-    return tuple(found)
+def _widened_m(programme: Programme, request: ImproveRequest) -> np.ndarray:
+    """(k, 2) ends of the openings with all places where the gun might open or close."""
+    room_m = (programme.ends_m - programme.around_m) * np.array([1.0, -1.0])
+    # Two openings may meet half way between them.
+    room_m[1:, 0] *= 0.5
+    room_m[:-1, 1] *= 0.5
+    most_m = np.minimum(request.trigger_shift_m, room_m).tolist()
+    found = [
+        (on - _usable_m(programme, on, -1.0, back), off + _usable_m(programme, off, 1.0, ahead))
+        for (on, off), (back, ahead) in zip(programme.ends_m.tolist(), most_m, strict=True)
+    ]
+    return np.array(found)
 
 
 def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -> float:
@@ -215,25 +212,23 @@ def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -
     return float(way[np.argmin(good)] if not good.all() else way[-1])
 
 
-def _openings(relaxed: Problem, density: np.ndarray, kept_m: np.ndarray) -> tuple[Opening, ...]:
-    """Openings that begin and end where the relaxed density reaches half of the least possible.
+def _ends_m(relaxed: Problem, density: np.ndarray, kept_m: np.ndarray) -> np.ndarray:
+    """(m, 2) where the relaxed density reaches half of the least possible in each opening.
 
-    Of each, (m, 2) the latest place to begin and the earliest to end are given.
+    It begins no later and ends no earlier than at ``kept_m`` (m, 2).
     """
     found, nodes = [], relaxed.nodes
-    for number, (opening, (latest, earliest)) in enumerate(
-        zip(nodes.openings, kept_m.tolist(), strict=True)
-    ):
+    for number, (latest, earliest) in enumerate(kept_m.tolist()):
         rows = nodes.rows(number)
         place = nodes.travel_m[rows]
-        least = opening.flow / relaxed.bounds[0][rows]
+        least = relaxed.given_flow[number] / relaxed.bounds[0][rows]
         worth = (density[rows] - 0.5 * least) / least
         kept = np.flatnonzero(~relaxed.open_ends[rows] | (worth > 0.0))
         first, last = int(kept[0]), int(kept[-1])
         on = min(_crossing_m(place, worth, first, first - 1), latest)
         off = max(_crossing_m(place, worth, last, last + 1), earliest)
-        found.append(replace(opening, on_m=on, off_m=off))
-    return tuple(found)
+        found.append((on, off))
+    return np.array(found)
 
 
 def _crossing_m(place_m: np.ndarray, worth: np.ndarray, inside: int, outside: int) -> float:
