@@ -163,15 +163,12 @@ class IndexPlanner(PaintNode):
         surface = read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'])
         for note in surface.notes:
             self.get_logger().warning(note)
+        # In requests and parameters 0 stands for none.
+        given_or_not = ('speed_m_per_s', 'target_um', 'index_m', 'standoff_m')
+        always = ('direction', 'smoothing_radius_m', 'acceleration_m_per_s2', 'travel_rad')
         request = PlanRequest(
-            speed_m_per_s=values['speed_m_per_s'] or None,
-            target_um=values['target_um'] or None,
-            index_m=values['index_m'] or None,
-            standoff_m=values['standoff_m'] or None,
-            direction=values['direction'],
-            smoothing_radius_m=values['smoothing_radius_m'],
-            acceleration_m_per_s2=values['acceleration_m_per_s2'],
-            travel_rad=values['travel_rad'],
+            **{name: values[name] or None for name in given_or_not},
+            **{name: values[name] for name in always},
             outward=tuple(values['outward']) or None,
         )
         frame_id = values['frame_id'].lstrip('/')
