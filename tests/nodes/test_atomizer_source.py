@@ -2,6 +2,7 @@
 
 import math
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -167,14 +168,20 @@ def test_a_signal_that_was_overtaken_takes_effect_with_the_newest(source, driver
     assert math.isnan(states[0].voltage_kv)
 
 
-def test_joint_states_that_are_refused_from_then_on_are_told(source, driver, viewer, wait_until):
-    node, robot = source(), driver()
-    robot.move(stamps_from_now())
-    wait_until(lambda: node.poses_published == len(WAY), what='the poses')
-    robot.move(stamps_from_now(), names=JOINTS[:5], rows=WAY[:, :5])
-    told = 'joint states are refused: '
-    wait_until(lambda: viewer.reports('atomizer_source: robot', told, b'\x02'), what=told)
-    assert 'wrist_roll' in viewer.status('atomizer_source: robot').message
+def test_joint_states_and_signals_that_are_refused_are_told(source, driver, viewer, wait_until):
+    """From the start, and joint states from then on."""
+    node = source(trigger='/io.level > 1')
+    robot = driver(('/io', UInt16))
+    for told in ('no joint state has all joints: ', 'joint states are refused: '):
+        robot.move(stamps_from_now(), names=JOINTS[:5], rows=WAY[:, :5])
+        reports = partial(viewer.reports, 'atomizer_source: robot', told, b'\x02')
+        wait_until(reports, what=told)
+        assert 'wrist_roll' in viewer.status('atomizer_source: robot').message
+        robot.move(stamps_from_now())
+        wait_until(lambda: node.poses_published >= len(WAY), what='the poses')
+    robot.say('/io', 1)
+    told = '/io: UInt16 has no number or Bool at .level'
+    wait_until(lambda: viewer.reports('atomizer_source: signals', told, b'\x02'))
 
 
 def test_a_trigger_alone_switches_the_gun(source, ros_context, spin, wait_until, viewer, switched):
@@ -200,17 +207,6 @@ def test_a_trigger_alone_switches_the_gun(source, ros_context, spin, wait_until,
     gun.publish(Bool(data=True))
     wait_until(lambda: viewer.reports('atomizer_source: signals', '/gun has no stamps', b'\x02'))
     switched(2)
-
-
-def test_unusable_signals_are_reported(source, driver, viewer, wait_until):
-    source(trigger='/io.level > 1')
-    robot = driver(('/io', UInt16))
-    robot.move(stamps_from_now(), names=JOINTS[:5], rows=WAY[:, :5])
-    robot.say('/io', 1)
-    wait_until(lambda: viewer.reports('atomizer_source: robot', 'no joint state has all'))
-    assert 'wrist_roll' in viewer.status('atomizer_source: robot').message
-    told = '/io: UInt16 has no number or Bool at .level'
-    wait_until(lambda: viewer.reports('atomizer_source: signals', told, b'\x02'))
 
 
 def test_a_signal_that_fails_keeps_the_gun_as_it_was(source, driver, viewer, wait_until, switched):

@@ -193,7 +193,7 @@ SWITCHED = replace(straight_pass(np.arange(0.0, 4.001, 0.02)), **CHANGES)
 
 def test_openings_end_where_the_brush_changes_also_between_poses_and_moves_keep_it():
     programme = Programme.of(SWITCHED)
-    found = [(o.on_m, o.off_m, o.flow, o.brush) for o in programme.openings]
+    found = np.column_stack([programme.ends_m, programme.flow, programme.brush])
     expected = [(0.15, 0.45, 1.0, 1), (0.45, 0.6, 1.0, 2), (0.9, 1.05, 0.5, 2)]
     np.testing.assert_allclose(found, expected, atol=1e-6)
     opened = [(flow, brush) for _, flow, brush in programme.trajectory().triggers if flow]
@@ -263,10 +263,9 @@ def test_gaps_between_poses_close_the_gun_and_flows_are_averaged():
     late = always.stamps_ns.copy()
     late[len(late) // 2 :] += 400_000_000
     both = always, replace(always, stamps_ns=late)
-    assert [len(Programme.of(motion).openings) for motion in both] == [1, 2]
+    assert [len(Programme.of(motion).ends_m) for motion in both] == [1, 2]
     flows = switched(stamps_ns([0.5, 1.5, 2.0]), (1.0, 1), (0.4, 1), (0, 0))
-    (opening,) = Programme.of(replace(SWITCHED, **flows)).openings
-    assert opening.flow == pytest.approx(0.8)
+    assert Programme.of(replace(SWITCHED, **flows)).flow == pytest.approx([0.8])
 
 
 def zone(name, target_um, tolerance_um, low_x=-1.0, high_x=1.0):

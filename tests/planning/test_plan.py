@@ -62,17 +62,17 @@ def test_what_was_asked_for_and_is_not_reached_is_warned_of(planned, wanted, wor
 def test_placing_beats_the_plane_s_recommendation_and_neighbouring_indices(planned):
     assert planned.sigma_n == pytest.approx(planned.placement.sigma_n, rel=0.1)
     films, index = planned.line_films, planned.placement.index_m
-    across, plane = tuple(films.surface_map.extent_m[1]), planned.plane
+    across, plane = films.surface_map.extent_m[1], planned.plane
     count = passes_to_cover(plane.curve.parallel, plane.index_m, np.ptp(across))
     of_plane = films.sigma_n(lines_of(count, plane.index_m, np.mean(across)))
     assert planned.sigma_n < 0.97 * of_plane
     for beside in (0.97 * index, 1.03 * index):
-        other = place_passes(films, across, (beside, beside))
+        other = place_passes(films, (beside, beside))
         assert other.index_m == pytest.approx(beside)
         np.testing.assert_allclose(np.diff(other.lines_m('horizontal')), beside, atol=1e-9)
         assert other.sigma_n > 0.97 * planned.placement.sigma_n
-    assert 0.22 <= place_passes(films, across, (0.22, 0.3)).index_m <= 0.3
-    assert place_passes(films, across, (5.0, 5.0)).index_m == 5.0
+    assert 0.22 <= place_passes(films, (0.22, 0.3)).index_m <= 0.3
+    assert place_passes(films, (5.0, 5.0)).index_m == 5.0
 
 
 def test_on_a_wide_plane_the_plan_is_as_even_as_the_recommendation():

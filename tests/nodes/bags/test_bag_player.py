@@ -18,7 +18,7 @@ from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.nodes.bags.pace import LOST_TIMEOUT_S, FlowControl
+from paint_deposition.nodes.bags.pace import LOST_TIMEOUT_S, Pace
 from robot_arm import JOINTS, URDF, sweep
 
 
@@ -239,37 +239,37 @@ def test_the_clock_stands_meanwhile(play, listen, watch, call, wait_until, pass_
 
 
 @pytest.fixture
-def window(cell):
-    """The control of a publisher of poses."""
+def pace(cell):
+    """That of a publisher of poses."""
     publisher = cell.create_publisher(PoseStamped, 'atomizer/pose', 10)
-    return FlowControl(cell, publisher, 200, threading.Event())
+    return Pace(cell, publisher, threading.Event(), rate=0.0, window=200, running=True)
 
 
-def published(window: FlowControl, stamps, now_s: float = 0.0) -> None:
+def published(pace: Pace, stamps, now_s: float = 0.0) -> None:
     for stamp in stamps:
-        window.add_sent(stamp, now_s)
+        pace.add_sent(stamp, now_s)
 
 
-def test_lost_poses_are_not_waited_for_while_reports_arrive(window):
-    window.set_subscribers(['simulator'], 0.0)
-    published(window, range(10))
+def test_lost_poses_are_not_waited_for_while_reports_arrive(pace):
+    pace.set_subscribers(['simulator'], 0.0)
+    published(pace, range(10))
     now_s = 0.0
     while now_s < LOST_TIMEOUT_S:
-        window.report('simulator', 6, now_s)
-        assert window.lag(now_s) == {'simulator': 3}
+        pace.report('simulator', 6, now_s)
+        assert pace.lag(now_s) == {'simulator': 3}
         now_s += 0.2
-    window.report('simulator', 6, now_s + 0.2)
-    assert window.lag(now_s + 0.2) == {}
-    assert window.subscribers['simulator'].lost == 3
+    pace.report('simulator', 6, now_s + 0.2)
+    assert pace.lag(now_s + 0.2) == {}
+    assert pace.subscribers['simulator'].lost == 3
 
 
-def test_only_present_subscribers_are_waited_for(window):
-    window.set_subscribers(['doomed', 'survivor'], 0.0)
-    published(window, range(10))
-    window.report('survivor', 9, 0.0)
-    assert window.lag(0.0) == {'doomed': 10}
-    window.set_subscribers(['late', 'survivor'], 0.0)
-    assert window.lag(0.0) == {}
-    published(window, range(10, 15))
-    window.report('survivor', 14, 0.0)
-    assert window.lag(0.0) == {'late': 5}
+def test_only_present_subscribers_are_waited_for(pace):
+    pace.set_subscribers(['doomed', 'survivor'], 0.0)
+    published(pace, range(10))
+    pace.report('survivor', 9, 0.0)
+    assert pace.lag(0.0) == {'doomed': 10}
+    pace.set_subscribers(['late', 'survivor'], 0.0)
+    assert pace.lag(0.0) == {}
+    published(pace, range(10, 15))
+    pace.report('survivor', 14, 0.0)
+    assert pace.lag(0.0) == {'late': 5}

@@ -160,10 +160,7 @@ class SignalSource(PaintNode):
             }
             lag = f'{1e3 * np.median(self._lags_s):.1f}' if self._lags_s else 'no time is sent'
             problems = [each for each in (self._problem, *self._problems.values()) if each]
-        values = received | {
-            'from the time of the server to arrival [ms]': lag,
-            'delay taken out [ms]': f'{1e3 * self.values["delay_s"]:.1f}',
-        }
+        values = received | {'from the time of the server to arrival [ms]': lag}
         for problem in {*problems} - self._logged:
             self.get_logger().error(problem)
         self._logged = {*problems}

@@ -25,10 +25,8 @@ MESSAGES = {
     'Quaternion': {f'u{k}': (k + 1, 'double') for k in range(4)},
     'Pose': {'pos': (1, 'Cartesian'), 'orient': (2, 'Quaternion')},
     'Joints': {'joints': (1, 'doubles')},
-    'Clock': {'sec': (1, 'uint64'), 'usec': (2, 'uint64')},
     'FeedBack': {
         'joints': (1, 'Joints'), 'cartesian': (2, 'Pose'), 'externalJoints': (3, 'Joints'),
-        'time': (4, 'Clock'),
     },
     'Robot': {'header': (1, 'Header'), 'feedBack': (2, 'FeedBack')},
 }  # fmt: skip
@@ -81,14 +79,11 @@ class EgmStream:
         sender: address of the robot, '' before the first packet; other: of another that sends,
             too, the last of them at ``other_ns``.
         late_ns: how much later than the fastest way the last packet came.
-        own_lag_ns: from the controller's own time of the last position to its arrival; None where
-            it was not sent. It is a lag only if both clocks are set.
     """
 
     def __init__(self, lag_ns: int) -> None:
         self.lag_ns = lag_ns
         self.received = self.lost = self.repeated = self.invalid = self.late_ns = 0
-        self.own_lag_ns: int | None = None
         self.sender = self.other = ''
         self.other_ns = self._heard_ns = self._sent_ns = 0
         self._newest: int | None = None
@@ -128,10 +123,6 @@ class EgmStream:
         fastest_ns = min(self._ways_ns)
         self.late_ns = arrived_ns - sent_ns - fastest_ns
         measured = robot.feedBack
-        self.own_lag_ns = None
-        if measured.HasField('time'):
-            own_ns = measured.time.sec * 1_000_000_000 + measured.time.usec * 1000
-            self.own_lag_ns = arrived_ns - own_ns
         pose = None
         if measured.cartesian.HasField('orient'):
             p, q = measured.cartesian.pos, measured.cartesian.orient
@@ -273,14 +264,11 @@ class EgmSource(PaintNode):
 
     def status(self) -> Status:
         stream, values = self.stream, self.values
-        own = 'not sent' if stream.own_lag_ns is None else f'{1e-6 * stream.own_lag_ns:.1f}'
         figures = {
             'robot': stream.sender or 'none yet', 'packets': stream.received,
             'packets lost': stream.lost, 'packets repeated': stream.repeated,
             'packets that are no EgmRobot': stream.invalid,
-            'lag taken out [ms]': f'{1e3 * values["lag_s"]:.1f}',
             'last packet later than the fastest [ms]': f'{1e-6 * stream.late_ns:.1f}',
-            "from the controller's own time to arrival [ms]": own,
         }  # fmt: skip
         if time.time_ns() - stream.other_ns < 10_000_000_000:
             remedy = 'give each robot a port and a node of its own, or robot_address'

@@ -13,12 +13,12 @@ from paint_msgs.action import PlanPasses
 from paint_msgs.srv import RecommendIndex
 from rclpy.action.server import ActionServer, CancelResponse, ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
+from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.model.eq1_pattern import MOST
-from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.node import OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.painting.painting_parameters import (
@@ -33,6 +33,7 @@ from paint_deposition.nodes.parameters import (
     requested,
 )
 from paint_deposition.nodes.topics import header, pose_message
+from paint_deposition.planning.joints import rows_apart
 from paint_deposition.planning.plan import Plan, kept_clear, plan
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRequest
@@ -162,15 +163,12 @@ class IndexPlanner(PaintNode):
         surface = read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'])
         for note in surface.notes:
             self.get_logger().warning(note)
+        # In requests and parameters 0 stands for none.
+        given_or_not = ('speed_m_per_s', 'target_um', 'index_m', 'standoff_m')
+        always = ('direction', 'smoothing_radius_m', 'acceleration_m_per_s2', 'travel_rad')
         request = PlanRequest(
-            speed_m_per_s=values['speed_m_per_s'] or None,
-            target_um=values['target_um'] or None,
-            index_m=values['index_m'] or None,
-            standoff_m=values['standoff_m'] or None,
-            direction=values['direction'],
-            smoothing_radius_m=values['smoothing_radius_m'],
-            acceleration_m_per_s2=values['acceleration_m_per_s2'],
-            travel_rad=values['travel_rad'],
+            **{name: values[name] or None for name in given_or_not},
+            **{name: values[name] for name in always},
             outward=tuple(values['outward']) or None,
         )
         frame_id = values['frame_id'].lstrip('/')
@@ -180,7 +178,13 @@ class IndexPlanner(PaintNode):
         self.get_logger().info(planned.sentence)
         for warning in planned.warnings:
             self.get_logger().warning(warning)
-        path = _path_message(planned.trajectory, self.get_clock().now().nanoseconds)
+        motion, now_ns = planned.trajectory, self.get_clock().now().nanoseconds
+        stamps_ns = now_ns + motion.stamps_ns - motion.stamps_ns[0]
+        poses = np.hstack([motion.positions_m, motion.quaternions_xyzw])
+        turns = Rotation.from_quat(motion.quaternions_xyzw)
+        path = Path(header=header(frame_id, now_ns))
+        for row in rows_apart(motion.positions_m, turns, step_m=0.02, step_rad=math.inf):
+            path.poses.append(pose_message(frame_id, int(stamps_ns[row]), poses[row]))
         self._path_publisher.publish(path)
         return planned, path
 
@@ -244,18 +248,3 @@ class IndexPlanner(PaintNode):
             'requests': self._requests,
         }
         return *self._last, values
-
-
-def _path_message(trajectory: Trajectory, start_ns: int) -> Path:
-    """Poses about 20 mm apart, both ends included, with stamps from ``start_ns`` on."""
-    step = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1)
-    travelled = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / 0.02)
-    kept = np.append(True, np.diff(travelled) > 0.0)
-    kept[-1] = True
-    stamps_ns = start_ns + trajectory.stamps_ns - trajectory.stamps_ns[0]
-    poses = np.hstack([trajectory.positions_m, trajectory.quaternions_xyzw])
-    message = Path(header=header(trajectory.frame_id, start_ns))
-    for row in np.flatnonzero(kept):
-        pose = pose_message(trajectory.frame_id, int(stamps_ns[row]), poses[row])
-        message.poses.append(pose)
-    return message

@@ -113,7 +113,6 @@ class ModelComparison(PaintingNode):
         if 'color_max_um' in names:
             bar = legend(self._scale, self.surface, self.frame.frame_id)
             self._legend_publisher.publish(bar)
-        self._shown = None
 
     # --- publishing
 

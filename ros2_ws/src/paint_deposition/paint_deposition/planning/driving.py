@@ -18,7 +18,6 @@ from paint_deposition.planning.joints import (
     REACHED,
     ROUNDS,
     JointPace,
-    PassLimit,
     Start,
     fastest_way,
     rolled,
@@ -40,7 +39,8 @@ class Drive:
     seconds: np.ndarray  # (M,) times of the joints from the first pose [s]
     joints: np.ndarray  # (M, J) [rad or m], and their speeds (M, J) per second
     speeds: np.ndarray
-    limits: tuple[PassLimit, ...]  # of passes that are slower than planned
+    # Why passes are slower than planned: sentences, with figures as of ``JointPace.limits``.
+    limits: dict[str, dict[str, Any]]
     least_singular_value: float  # of the tip's velocity by those of the joints, m and rad alike
 
     @property
@@ -69,7 +69,7 @@ class Drive:
             'joints': list(self.arm.joints),
             'nearest_to_limit': {'joint': joint, 'share_of_range': room},
             'least_singular_value': self.least_singular_value,
-            'limits': [vars(limit) for limit in self.limits],
+            'limits': list(self.limits.values()),
         }
 
 

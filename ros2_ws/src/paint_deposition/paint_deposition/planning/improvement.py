@@ -96,7 +96,8 @@ class Improvement:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user on what was done unasked."""
-        if Programme.of(self.before.trajectory).openings == self.retiming.original.openings:
+        given_m = Programme.of(self.before.trajectory).ends_m
+        if np.array_equal(given_m, self.retiming.original.ends_m):
             return ()
         return (
             'the programme sprays through turns beside the part; the gun is closed there now '
@@ -108,41 +109,39 @@ class Improvement:
         """What changes, pass by pass, numbered as a simulation of the improved programme does."""
         original, improved = self.retiming.original, self.retiming.programme
         ends_m, numbers, begins_pass = strokes_of(improved)
-        given = Programme.of(self.before.trajectory).openings
-        opened_m, closed_m = {one.on_m for one in given}, {one.off_m for one in given}
-        pairs = list(zip(original.openings, improved.openings, strict=True))
+        opened_m, closed_m = Programme.of(self.before.trajectory).ends_m.T
+        on_m, off_m = improved.ends_m.T
         found: list[PassChange] = []
         for (begin, end), number in zip(ends_m[begins_pass], numbers[begins_pass], strict=True):
             # Less of an opening, or of a short pass or opening, is of its neighbour [m].
-            own = [
-                (before, after) for before, after in pairs
-                if min(after.off_m, end) - max(after.on_m, begin)
-                > min(0.05, 0.3 * (after.off_m - after.on_m), 0.3 * (end - begin))
-            ]  # fmt: skip
-            if not own:
+            common_m = np.minimum(off_m, end) - np.maximum(on_m, begin)
+            enough_m = np.minimum(0.3 * (off_m - on_m), min(0.05, 0.3 * (end - begin)))
+            own = np.flatnonzero(common_m > enough_m)
+            if not len(own):
                 continue
-            (first_before, first), (last_before, last) = own[0], own[-1]
-            on, off = max(first.on_m, begin), min(last.off_m, end)
+            first, last = own[[0, -1]]
+            on, off = float(max(on_m[first], begin)), float(min(off_m[last], end))
+            given_on, given_off = original.ends_m[first, 0], original.ends_m[last, 1]
             inside = on + STANDING_M, off - STANDING_M  # without a stay at either end
             # A turn that is sprayed through has no trigger that could be earlier or later.
-            opens = on == first.on_m and first_before.on_m in opened_m
-            closes = off == last.off_m and last_before.off_m in closed_m
-            earlier = first_before.on_m - on if opens else 0.0
-            later = off - last_before.off_m if closes else 0.0
+            opens = on == on_m[first] and given_on in opened_m
+            closes = off == off_m[last] and given_off in closed_m
+            earlier = float(given_on - on) if opens else 0.0
+            later = float(off - given_off) if closes else 0.0
             old, new = (float(p.speed_between(*inside)) for p in (original, improved))
             places = np.linspace(*inside, 61)
             speed = improved.speed_between(places[:-1], places[1:])
             found.append(PassChange(
                 int(number) + 1, (on, off), (old, new), float(speed.min()), float(speed.max()),
                 earlier, later, earlier / float(speed[0]), later / float(speed[-1]),
-                (first_before.flow, first.flow),
+                (float(original.flow[first]), float(improved.flow[first])),
             ))  # fmt: skip
         return tuple(found)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong, a line each with its likely cause."""
-        found = [*self.geometry_warnings, *map(str, self.drive.limits if self.drive else ())]
+        found = [*self.geometry_warnings, *(self.drive.limits if self.drive else ())]
         found += self.wanted.doubts(self.after.statistics)
         target_um = self.retiming.target_um
         off = self.after.mean_um / target_um - 1.0

@@ -6,6 +6,7 @@ the best way through all poses can be chosen. The fastest motion along it is a l
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -140,23 +141,6 @@ def fastest_way(arm: Arm, ways: np.ndarray, reached: np.ndarray, times_s: np.nda
 
 
 @dataclass(frozen=True)
-class PassLimit:
-    """The joint that keeps a pass from its planned speed."""
-
-    number: int  # of the pass, from 1
-    share: float  # of the planned speed that is left
-    joint: str
-    of_speed: bool  # whether its speed limits, not its acceleration
-
-    def __str__(self) -> str:
-        what = 'speed' if self.of_speed else 'acceleration'
-        return (
-            f'pass {self.number} runs at {100 * self.share:.0f} % of the planned speed, which the '
-            f'{what} of {self.joint} allows'
-        )
-
-
-@dataclass(frozen=True)
 class JointPace:
     """What the joints along a motion allow; they are a function of the planned time."""
 
@@ -254,11 +238,15 @@ class JointPace:
         np.maximum.at(over, step, of_limit.max(axis=1))
         return reached_s, seconds, joints, slope * share, over
 
-    def limits(self, spray_pass: np.ndarray, shares: np.ndarray) -> tuple[PassLimit, ...]:
-        """For each pass that is slower than planned, the joint that makes it so."""
+    def limits(self, spray_pass: np.ndarray, shares: np.ndarray) -> dict[str, dict[str, Any]]:
+        """Which joint makes a pass slower than planned, for each such pass: sentence, figures.
+
+        They are the number of the pass, from 1; the share of the planned speed that is left; the
+        joint; and whether its speed limits, not its acceleration (``of_speed``).
+        """
         slope = np.abs(self.joints(self.times_s, 1)) / self.arm.fastest
         bend = np.sqrt(np.abs(self.joints(self.times_s, 2)) / self.most)
-        found = []
+        found = {}
         for number in np.unique(spray_pass[spray_pass >= 0]).tolist():
             inside = spray_pass == number
             share = float(shares[inside].min())
@@ -268,5 +256,11 @@ class JointPace:
             speed, rate = slope[inside].max(axis=0), bend[inside].max(axis=0)
             of_speed = speed.max() > rate.max()
             joint = int(np.argmax(speed if of_speed else rate))
-            found.append(PassLimit(number + 1, share, self.arm.joints[joint], bool(of_speed)))
-        return tuple(found)
+            name, what = self.arm.joints[joint], 'speed' if of_speed else 'acceleration'
+            sentence = (
+                f'pass {number + 1} runs at {100 * share:.0f} % of the planned speed, which the '
+                f'{what} of {name} allows'
+            )
+            told = {'number': number + 1, 'share': share, 'joint': name}
+            found[sentence] = told | {'of_speed': bool(of_speed)}
+        return found

@@ -11,7 +11,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.programme import STANDING_M, Opening, Programme
+from paint_deposition.planning.programme import STANDING_M, Programme
 from paint_deposition.planning.requests import ImproveRequest
 
 # What limits the speed, as messages call it.
@@ -25,25 +25,20 @@ class Nodes:
 
     travel_m: np.ndarray  # (n,) length of the path up to each node, opening after opening
     opening: np.ndarray  # (n,) number of its opening
-    openings: tuple[Opening, ...]  # the openings that they belong to
+    ends_m: np.ndarray  # (m, 2) travel at which the openings that they belong to begin and end
 
     @staticmethod
-    def of(openings: tuple[Opening, ...], spacing_m: float) -> 'Nodes':
+    def of(ends_m: np.ndarray, spacing_m: float) -> 'Nodes':
         """Even nodes, about so far apart, both ends of each opening included."""
         places = [
-            np.linspace(o.on_m, o.off_m, max(2, math.ceil((o.off_m - o.on_m) / spacing_m) + 1))
-            for o in openings
+            np.linspace(on, off, max(2, math.ceil((off - on) / spacing_m) + 1))
+            for on, off in ends_m.tolist()
         ]
         numbers = [np.full(len(place), k) for k, place in enumerate(places)]
-        return Nodes(np.concatenate(places), np.concatenate(numbers), openings)
+        return Nodes(np.concatenate(places), np.concatenate(numbers), ends_m)
 
     def __len__(self) -> int:
         return len(self.travel_m)
-
-    @property
-    def given_flow(self) -> np.ndarray:
-        """(m,) flow of the openings."""
-        return np.array([opening.flow for opening in self.openings])
 
     @property
     def followed(self) -> np.ndarray:
@@ -179,8 +174,7 @@ class FilmAtPoints:
         # The opening that each sub-step belongs to: the last that has begun.
         begun = np.searchsorted(programme.ends_m[:, 0], travel, side='right')
         sprayed, rows = self._integrator.sprayed(path)
-        ends = np.array([[one.on_m, one.off_m] for one in nodes.openings])
-        inside = np.clip(travel[rows], *ends[np.maximum(begun - 1, 0)[rows]].T)
+        inside = np.clip(travel[rows], *programme.ends_m[np.maximum(begun - 1, 0)[rows]].T)
         # (M, n) weights of the nodes at the sub-steps.
         hats = BSpline.design_matrix(inside, np.pad(nodes.travel_m, 1, 'edge'), 1)
         shares = hats.multiply(1.0 / (hats @ density)[:, np.newaxis]).tocsc()

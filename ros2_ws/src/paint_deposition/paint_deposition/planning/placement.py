@@ -160,8 +160,8 @@ class LineFilms:
     film changes across a pass; lines are laid up to ``beyond_m`` past the part's edges.
 
     Attributes:
-        lines_m: (L,) the lines, and low_m and high_m their ends [m].
-        films_um: (L, V) film of each pass at the part's vertices ``rows`` (V,).
+        surface_map: of the painted side.
+        low_m, high_m: the outermost lines [m].
     """
 
     def __init__(
@@ -175,32 +175,32 @@ class LineFilms:
         progress: Callable[[float], None] = lambda share: None,
     ) -> None:
         chosen = stratified_sample(surface.vertex_areas_m2[surface_map.painted])
-        self.rows = rows = np.flatnonzero(surface_map.painted)[chosen]
+        rows = np.flatnonzero(surface_map.painted)[chosen]
         self.surface_map = surface_map
         points = SurfacePoints(surface.vertices_m[rows], surface.normals[rows], down=surface.down)
         low, high = surface_map.extent_m[1]
         self.low_m, self.high_m = low - beyond_m, high + beyond_m
         step = min(finest_m / 5.0, 0.02)
         count = math.ceil((self.high_m - self.low_m) / step) + 1
-        self.lines_m = np.linspace(self.low_m, self.high_m, count)
+        lines_m = np.linspace(self.low_m, self.high_m, count)
         integrator = FilmIntegrator(points, model)
         # Sub-steps of single passes may be coarser than for a film: 1e-4 of the peak.
         longest = finest_m / 5.0
         # Poses about a sub-step apart; slower ones would be gaps, at which the gun is off.
         rate = max(style.speed_m_per_s / longest, 10.0)
-        self.films_um = np.empty((count, len(rows)))
-        for k, across in enumerate(self.lines_m):
+        self._films_um = np.empty((count, len(rows)))
+        for k, across in enumerate(lines_m):
             line = (plan_pass(surface_map, float(across), style),)
             path, _ = spray_path(trajectory_of(line, rate_hz=rate), max_step_m=longest)
-            self.films_um[k] = integrator.raw_of(path)
+            self._films_um[k] = integrator.raw_of(path)
             progress((k + 1) / count)
         # Cubic splines through the lines' films are linear in them: one matrix for all points.
-        self._basis = CubicSpline(self.lines_m, np.eye(count))
+        self._basis = CubicSpline(lines_m, np.eye(count))
 
     def sigma_n(self, lines_m: np.ndarray) -> np.ndarray:
         """(...) standard deviation over mean of the film of passes along lines (..., n) [m]."""
         weights = self._basis(np.clip(lines_m, self.low_m, self.high_m)).sum(axis=-2)
-        film = weights @ self.films_um
+        film = weights @ self._films_um
         return film.std(axis=-1) / film.mean(axis=-1)
 
 
@@ -226,25 +226,22 @@ def lines_of(passes: int, index_m: float | np.ndarray, middle_m: float | np.ndar
 
 
 def place_passes(
-    films: LineFilms,
-    extent_m: tuple[float, float],
-    index_range_m: tuple[float, float],
-    tolerance: float | None = None,
+    films: LineFilms, index_range_m: tuple[float, float], tolerance: float | None = None
 ) -> Placement:
     """The placement with the fewest passes that is nearly the most even, or within tolerance.
 
-    ``extent_m``: ends of the part across the passes; ``index_range_m``: equal ends fix the index.
+    Equal ends of the range fix the index.
 
     Raises:
         PlanError: no placement is within the tolerance; names the closest.
     """
-    height = extent_m[1] - extent_m[0]
+    height = float(np.ptp(films.surface_map.extent_m[1]))
     fewest = max(1, int(height / index_range_m[1]))
     most = max(fewest, int(np.ceil(height / index_range_m[0])) + 1)
     best = [
         placement
         for passes in range(fewest, most + 1)
-        if (placement := best_placement(films, extent_m, index_range_m, passes)) is not None
+        if (placement := best_placement(films, index_range_m, passes)) is not None
     ]
     closest = min(best, key=lambda placement: placement.sigma_n)
     # Loss of evenness accepted for one pass fewer: relative, and in sigma_n itself.
@@ -261,13 +258,10 @@ def place_passes(
 
 
 def best_placement(
-    films: LineFilms,
-    extent_m: tuple[float, float],
-    index_range_m: tuple[float, float],
-    passes: int,
+    films: LineFilms, index_range_m: tuple[float, float], passes: int
 ) -> Placement | None:
     """The most even placing of so many passes; None where it has no room."""
-    middle = 0.5 * (extent_m[0] + extent_m[1])
+    middle = 0.5 * float(films.surface_map.extent_m[1].sum())
     low, high = index_range_m
     # Lines further out than the films that are kept are not considered.
     widest = (films.high_m - films.low_m) / max(passes - 1, 1)

@@ -35,7 +35,15 @@ from paint_deposition.planning.planned_film import (
 )
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.recommendation import Recommendation, recommend
-from paint_deposition.planning.requests import GunEnvelope, PlanRequest
+from paint_deposition.planning.requests import (
+    FASTEST_M_PER_S,
+    SLOWEST_M_PER_S,
+    GunEnvelope,
+    ImproveRequest,
+    IndexRequest,
+    PassRequest,
+    PlanRequest,
+)
 from paint_deposition.planning.retiming import timed_evenly
 from paint_deposition.planning.sides import SurfaceMap, pass_axes
 
@@ -114,22 +122,26 @@ def plan(
     axes = pass_axes(surface, request.direction, request.outward)
     surface_map = SurfaceMap(surface, axes, request.smoothing_radius_m)
     wanted = WantedFilm.of(surface, surface_map.painted, request.target_um, zones)
-    (left, right), ends = surface_map.extent_m.tolist()
-    height = ends[1] - ends[0]
+    width, height = np.ptp(surface_map.extent_m, axis=1).tolist()
     # Speeds along the passes may make a film even that is not at one speed.
     tolerance = None if request.optimise else request.tolerance
     even = request.model_copy(update={'target_um': wanted.target_um, 'tolerance': tolerance})
+    # On a plane of the part's size, at any speed: a part needs another than its plane.
+    on_plane = IndexRequest(
+        **{name: getattr(even, name) for name in PassRequest.model_fields},
+        width_m=height, length_m=width,
+        speed_min_m_per_s=SLOWEST_M_PER_S, speed_max_m_per_s=FASTEST_M_PER_S,
+    )  # fmt: skip
     try:
-        plane = recommend(model, even.for_plane(height, right - left))
+        plane = recommend(model, on_plane)
     except PlanError:  # a part may keep to a tolerance that no plane keeps to
-        anyhow = even.model_copy(update={'tolerance': None})
-        plane = recommend(model, anyhow.for_plane(height, right - left))
+        plane = recommend(model, on_plane.model_copy(update={'tolerance': None}))
     style = _style(model, request, plane)
     films = LineFilms(
         surface, surface_map, model, style, plane.curve.parallel.first.finest_m,
         0.5 * plane.sb50_m, lambda share: progress('single passes', share),
     )  # fmt: skip
-    placement = place_passes(films, ends, request.index_range_m(plane.index_m), tolerance)
+    placement = place_passes(films, request.index_range_m(plane.index_m), tolerance)
     target = None if request.speed_m_per_s else wanted.target_um
     rounds = 4
     for round_ in range(rounds):
@@ -189,13 +201,12 @@ def optimise(
     target = unoptimised.wanted.target_um or unoptimised.mean_um
     areas_m2 = unoptimised.surface.vertex_areas_m2
     wanted_cm3 = target * float(areas_m2[unoptimised.wanted.region].sum())
-    low, high = unoptimised.line_films.surface_map.extent_m[1].tolist()
     index_range_m = request.index_range_m(unoptimised.plane.index_m)
     placements = [unoptimised.placement]
     # From two passes fewer than in the unoptimised plan to one more.
     for passes in range(max(1, count - 2), count + 2):
         if passes != count:
-            placement = best_placement(unoptimised.line_films, (low, high), index_range_m, passes)
+            placement = best_placement(unoptimised.line_films, index_range_m, passes)
             placements += [placement] if placement else []
     tried = []
     for number, placement in enumerate(sorted(placements, key=lambda one: one.passes)):
@@ -245,11 +256,11 @@ def _timed_plan(
         replace(planned, speed_m_per_s=speed)
         for planned in plan_passes(unoptimised.line_films.surface_map, lines, style)
     )
-    zones, model = unoptimised.wanted.zones, unoptimised.model
+    model = unoptimised.model
     trajectory, moves = timed_evenly(
         surface, model, request, unoptimised.wanted, passes,
         trajectory_of(passes, unoptimised.trajectory.frame_id),
-        request.target_um if zones else target_um, wanted_cm3, unoptimised.cycle_time_s, progress,
+        target_um, wanted_cm3, unoptimised.cycle_time_s, progress,
     )  # fmt: skip
     film = simulated(surface, model, trajectory, lambda share: progress('film', share))
     laid = LaidFilm.of(surface, unoptimised.wanted, trajectory, *film)
@@ -286,7 +297,7 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
         )
     # The robot program has moves as long as one that keeps the planned speeds.
     shortest_m = WAYPOINT_STEP_M * WAYPOINTS_PER_MOVE
-    wanted = request.improvement(0.0, request.target_um, move_min_m=shortest_m)
+    wanted = ImproveRequest(move_min_m=shortest_m)
     moves = tuple(moves_of(Programme.of(drive.trajectory), wanted))
     return replace(planned, **vars(laid), moves=moves, drive=drive)
 

@@ -111,14 +111,6 @@ class WantedFilm:
             found.append((here.number < 0, self.elsewhere_um, tolerance))
         return found
 
-    def accepted(self, film_um: np.ndarray, target_um: float, tolerance: float) -> np.ndarray:
-        """(V,) bool, where a film (V,) [um] is within its band; the rest as for ``bands``."""
-        good = np.zeros(len(film_um), dtype=bool)
-        for points, target, share in self.bands(np.arange(len(good)), target_um, tolerance):
-            off = share or 0.0
-            good |= points & (film_um >= target * (1.0 - off)) & (film_um <= target * (1.0 + off))
-        return good
-
 
 def simulated(
     surface: Surface,
@@ -170,7 +162,10 @@ class LaidFilm:
             for rows in (region, np.ones_like(region))
         )  # fmt: skip
         film, area = film_um[region], surface.vertex_areas_m2[region]
-        good = wanted.accepted(film_um, target_um, tolerance)[region]
+        good = np.zeros(len(film), dtype=bool)
+        for points, target, share in wanted.bands(np.flatnonzero(region), target_um, tolerance):
+            off = share or 0.0
+            good |= points & (film >= target * (1.0 - off)) & (film <= target * (1.0 + off))
         return LaidFilm(
             trajectory, film_um, paint, statistics, whole_part, evenness(film, area)[0],
             evenness(film / wanted.share[region], area)[1], float(area[good].sum() / area.sum()),
@@ -294,7 +289,7 @@ class PlannedFilm(LaidFilm):
         slowed = bool(self.drive and self.drive.limits)
         # A mean film this close to the target is on it; speeds this close to a limit keep it.
         near = 0.01
-        yield from map(str, self.drive.limits if self.drive else ())
+        yield from self.drive.limits if self.drive else ()
         yield from map(str, self.contacts)
         yield from self.wanted.doubts(self.statistics)
         if target and not self.wanted.zones and abs(self.mean_um / target - 1.0) > near:

@@ -12,12 +12,7 @@ from paint_deposition.errors import PlanError
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen
 from paint_deposition.motion.programmed import Move
-from paint_deposition.motion.trajectory import (
-    DEFAULT_MAX_POSE_GAP_S,
-    ONLY_BRUSH,
-    Trajectory,
-    gap_ns,
-)
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory, gap_ns
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.requests import ImproveRequest
 
@@ -28,17 +23,6 @@ BEGIN_NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
-class Opening:
-    """A stretch of the path along which the gun is open."""
-
-    # Travel of the TCP at which it opens and closes.
-    on_m: float
-    off_m: float
-    flow: float  # relative to the calibrated one
-    brush: int = ONLY_BRUSH  # number of the brush; 0 is the only one
-
-
-@dataclass(frozen=True)
 class Programme:
     """The path of a motion, how long each piece of it takes, and where the gun is open."""
 
@@ -46,7 +30,10 @@ class Programme:
     quaternions_xyzw: np.ndarray
     travel_m: np.ndarray  # (N,) length of the path up to each pose
     duration_s: np.ndarray  # (N - 1,) time from each pose to the next
-    openings: tuple[Opening, ...]  # in order, apart from each other
+    # Stretches along which the gun is open, in order, apart from each other.
+    ends_m: np.ndarray  # (k, 2) travel at which it opens and closes
+    flow: np.ndarray  # (k,) relative to the calibrated one
+    brush: np.ndarray  # (k,) number of the brush; 0 is the only one
     original: Trajectory  # the motion that it was made from
     # Travels and the speeds that the joints of a robot allow there; None: any.
     allowed: tuple[np.ndarray, np.ndarray] | None = None
@@ -54,6 +41,9 @@ class Programme:
     @staticmethod
     def of(trajectory: Trajectory, max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S) -> 'Programme':
         """From a motion as recorded or programmed.
+
+        Gaps between poses close the gun. Flows that change while it is open are taken as their
+        mean over time.
 
         Raises:
             PlanError: the gun never sprays on a move, or its clock goes back in between.
@@ -68,14 +58,30 @@ class Programme:
             )
         steps_m = np.linalg.norm(np.diff(poses.positions_m, axis=0), axis=1)
         travel = np.append(0.0, np.cumsum(steps_m))
-        seconds = (poses.stamps_ns - poses.stamps_ns[0]) * 1e-9
-        programme = Programme(
-            poses.positions_m, poses.quaternions_xyzw, travel, np.diff(seconds),
-            _openings(trajectory, poses.stamps_ns, travel, max_pose_gap_s), trajectory,
-        )  # fmt: skip
-        if not programme.openings:
+        since_ns = poses.stamps_ns - poses.stamps_ns[0]
+        path, _ = spray_path(trajectory, max_pose_gap_s, whole_strokes=False)
+        half_ns = np.rint(0.5e9 * path.dwell_s).astype(np.int64)
+        edges_ns = np.stack([path.stamp_ns - half_ns, path.stamp_ns + half_ns])
+        edges_ns -= poses.stamps_ns[0]
+        on_m, off_m = np.interp(edges_ns, since_ns, travel)
+        sprays = path.flow > 0.0
+        breaks = (sprays[1:] != sprays[:-1]) | (path.brush[1:] != path.brush[:-1])
+        # The halves of two sub-steps are rounded, each to a nanosecond.
+        # Sub-steps this close in time follow each other.
+        breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > 4
+        openings = []
+        for rows in filter(len, np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks))):
+            on, off = float(on_m[rows[0]]), float(off_m[rows[-1]])
+            if sprays[rows[0]] and off - on > STANDING_M:
+                flow = float(np.average(path.flow[rows], weights=path.dwell_s[rows]))
+                openings.append((on, off, flow, int(path.brush[rows[0]])))
+        if not openings:
             raise PlanError(f'{trajectory.source}: the gun never sprays on a move')
-        return programme
+        *ends, flows, brushes = map(np.array, zip(*openings, strict=True))
+        return Programme(
+            poses.positions_m, poses.quaternions_xyzw, travel, np.diff(since_ns * 1e-9),
+            np.stack(ends, axis=1), flows, brushes, trajectory,
+        )  # fmt: skip
 
     @cached_property
     def clock_s(self) -> np.ndarray:
@@ -108,11 +114,6 @@ class Programme:
     def turns_at_s(self, seconds: np.ndarray) -> Rotation:
         """Turns (n,) of the tool at times (n,) from the first pose."""
         return Slerp(self.clock_s, Rotation.from_quat(self.quaternions_xyzw))(seconds)
-
-    @property
-    def ends_m(self) -> np.ndarray:
-        """(k, 2) travel at which each opening begins and ends [m]."""
-        return np.array([[opening.on_m, opening.off_m] for opening in self.openings])
 
     @property
     def around_m(self) -> np.ndarray:
@@ -150,22 +151,17 @@ class Programme:
         whole = self.with_poses_at(self.ends_m.ravel())
         clock = whole.clock_s
         stamps = BEGIN_NS + np.round(clock * 1e9).astype(np.int64)
-        triggers, flows, brushes = [], [], []
-        for opening in self.openings:
-            # Standing at either end is outside.
-            on = np.interp(opening.on_m + STANDING_M, whole.travel_m, clock)
-            off = np.interp(opening.off_m - STANDING_M, whole.travel_m, clock)
-            triggers += [BEGIN_NS + round(on * 1e9), BEGIN_NS + round(off * 1e9)]
-            flows += [opening.flow, 0.0]
-            brushes += [opening.brush] * 2
+        # Standing at either end is outside.
+        inside_m = self.ends_m + np.array([STANDING_M, -STANDING_M])
+        switched_s = np.interp(inside_m.ravel(), whole.travel_m, clock)
         return replace(
             self.original,
             stamps_ns=stamps,
             positions_m=whole.positions_m,
             quaternions_xyzw=whole.quaternions_xyzw,
-            trigger_stamps_ns=np.array(triggers, np.int64),
-            trigger_flow=np.array(flows),
-            trigger_brush=np.array(brushes, np.int64),
+            trigger_stamps_ns=BEGIN_NS + np.round(switched_s * 1e9).astype(np.int64),
+            trigger_flow=np.outer(self.flow, [1.0, 0.0]).ravel(),
+            trigger_brush=np.repeat(self.brush, 2),
         )
 
 
@@ -192,48 +188,25 @@ def closed_beside(programme: Programme, surface: Surface) -> Programme:
 
     Beside it is a link along which the tool's axis meets the part nowhere.
     """
-    ends_m, _, begins_pass = strokes_of(programme)
-    openings = programme.openings
+    strokes_m, _, begins_pass = strokes_of(programme)
+    ends_m = programme.ends_m
+    cut_from: np.ndarray = np.arange(len(ends_m))
     # The gun is closed so far before a turn and opened so far behind it: their places are
     # estimates [m].
     turn = 0.02
-    for begin, end in ends_m[~begins_pass]:
+    for begin, end in strokes_m[~begins_pass]:
         # Whether a link meets the part is looked at this often along it [m].
         places = np.linspace(begin, end, math.ceil((end - begin) / 0.01) + 2)[1:-1]
         axes = programme.turns_at_s(programme.seconds_at(places)).as_matrix()[:, :, 2]
         if (surface.first_faces(programme.positions_at_m(places), axes) < 0).all():
-            pieces = [
-                replace(one, on_m=max(one.on_m, low), off_m=min(one.off_m, high))
-                for one in openings
-                for low, high in ((-math.inf, begin - turn), (end + turn, math.inf))
-            ]
-            openings = tuple(one for one in pieces if one.off_m - one.on_m > STANDING_M)
-    return replace(programme, openings=openings)
-
-
-def _openings(
-    trajectory: Trajectory, stamps_ns: np.ndarray, travel_m: np.ndarray, max_pose_gap_s: float
-) -> tuple[Opening, ...]:
-    """Where the gun is open on the way; gaps between poses close it.
-
-    Flows that change while it is open are taken as their mean over time.
-    """
-    path, _ = spray_path(trajectory, max_pose_gap_s, whole_strokes=False)
-    half_ns, first_ns = np.rint(0.5e9 * path.dwell_s).astype(np.int64), stamps_ns[0]
-    edges_ns = np.stack([path.stamp_ns - half_ns, path.stamp_ns + half_ns]) - first_ns
-    on_m, off_m = np.interp(edges_ns, stamps_ns - first_ns, travel_m)
-    sprays = path.flow > 0.0
-    breaks = (sprays[1:] != sprays[:-1]) | (path.brush[1:] != path.brush[:-1])
-    # The halves of two sub-steps are rounded, each to a nanosecond.
-    # Sub-steps this close in time follow each other.
-    breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > 4
-    openings = []
-    for rows in filter(len, np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks))):
-        on, off = float(on_m[rows[0]]), float(off_m[rows[-1]])
-        if sprays[rows[0]] and off - on > STANDING_M:
-            flow = float(np.average(path.flow[rows], weights=path.dwell_s[rows]))
-            openings.append(Opening(on, off, flow, int(path.brush[rows[0]])))
-    return tuple(openings)
+            # Of each opening what lies before the link, and what lies behind it.
+            pieces_m = np.repeat(ends_m, 2, axis=0)
+            pieces_m[::2, 1] = np.minimum(ends_m[:, 1], begin - turn)
+            pieces_m[1::2, 0] = np.maximum(ends_m[:, 0], end + turn)
+            kept = np.diff(pieces_m)[:, 0] > STANDING_M
+            ends_m, cut_from = pieces_m[kept], np.repeat(cut_from, 2)[kept]
+    flow, brush = programme.flow[cut_from], programme.brush[cut_from]
+    return replace(programme, ends_m=ends_m, flow=flow, brush=brush)
 
 
 def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
@@ -275,9 +248,9 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
             pace = float(speed[before : row if moves else opened].max())
         pace = max(round(pace / 1e-5) * 1e-5, 1e-3)  # a program's speeds have few digits
         pose = whole.positions_m[row], whole.quaternions_xyzw[row]
-        opening = programme.openings[max(number, 0)]
-        flow = opening.flow if spraying else 1.0
-        moves.append(Move(*pose, pace, spraying, flow=flow, brush=opening.brush))
+        flow = float(programme.flow[number]) if spraying else 1.0
+        brush = int(programme.brush[max(number, 0)])
+        moves.append(Move(*pose, pace, spraying, flow=flow, brush=brush))
     return moves
 
 

@@ -28,19 +28,6 @@ Constraints = tuple[np.ndarray, csr_matrix, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Density:
-    """A density of paint along the path: a start or a solution."""
-
-    density: np.ndarray  # (n,) of the paint [s/m]
-    flow: np.ndarray  # (m,) of each opening
-    binding: tuple[str, ...] = ()  # names of the limits that bind
-
-    def slowness(self, nodes: Nodes) -> np.ndarray:
-        """(n,) seconds per metre."""
-        return self.density / self.flow[nodes.opening]
-
-
-@dataclass(frozen=True)
 class Problem:
     """What is to be minimised over densities and flows."""
 
@@ -48,6 +35,7 @@ class Problem:
     films: Sequence[np.ndarray]
     target_um: float  # film wanted
     bands: Sequence[Band]  # of the points
+    given_flow: np.ndarray  # (m,) of each opening in the original programme
     # Of the path.
     nodes: Nodes
     bounds: tuple[np.ndarray, np.ndarray]  # greatest speeds and their limits, see speed_bounds
@@ -57,9 +45,9 @@ class Problem:
     open_ends: np.ndarray  # (n,) bool, nodes at which the gun may be closed
     left_out: frozenset[str] = frozenset()  # names of limits that are left out
 
-    def films_um(self, found: Density) -> list[np.ndarray]:
-        """(V,) film of each model for a density [um]."""
-        return [found.density @ films for films in self.films]
+    def films_um(self, density: np.ndarray) -> list[np.ndarray]:
+        """(V,) film of each model for a density of paint (n,) [um]."""
+        return [density @ films for films in self.films]
 
     def relaxed(self) -> 'Problem':
         """Without weights and limits, except that on the flow: for evenness alone."""
@@ -73,17 +61,22 @@ class Problem:
         )
 
 
-def solve(problem: Problem, start: Density, rounds: int = 8) -> Density:
+def solve(
+    problem: Problem, density: np.ndarray, flow: np.ndarray, rounds: int = 8
+) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
     """Minimise in ``rounds`` at most; the first tangents are taken at the start.
+
+    Start and solution are a density of paint (n,) [s/m] and the flow of each opening (m,); the
+    names of the limits that bind come last.
 
     Raises:
         PlanError: the limits contradict each other; names one of them.
     """
-    count, now = len(problem.nodes), start
+    count, binding = len(problem.nodes), ()
     least, most = problem.request.flow
     for _ in range(rounds):
-        constraints = names, rows, limit = _constraints(problem, now)
-        matrix, linear = _objective(problem, now)
+        constraints = names, rows, limit = _constraints(problem, density, flow)
+        matrix, linear = _objective(problem, density, flow)
         answer = _minimise(matrix, linear, constraints)
         if answer is None:
             contradicting = 'the limits'
@@ -100,21 +93,21 @@ def solve(problem: Problem, start: Density, rounds: int = 8) -> Density:
         costly = names[multipliers * float(values[:count].mean()) > 1e-6]
         flow, limits = values[count:], LIMITS
         if least >= most:
-            flow, limits = problem.nodes.given_flow, LIMITS - {FLOW}
+            flow, limits = problem.given_flow, LIMITS - {FLOW}
         binding = tuple(name for name in dict.fromkeys(costly.tolist()) if name in limits)
-        found = Density(np.maximum(values[:count], 0.0), flow, binding)
-        change = np.abs(found.density - now.density).max() / np.abs(found.density).max()
-        now = found
-        if change < 3e-3:
+        before, density = density, np.maximum(values[:count], 0.0)
+        if np.abs(density - before).max() / np.abs(density).max() < 3e-3:
             break
-    return now
+    return density, flow, binding
 
 
-def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
+def _objective(
+    problem: Problem, density: np.ndarray, flow: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Matrix and vector of x'Mx / 2 + v'x: evenness, hinges, paint, time, smoothness, flows."""
     nodes, request, count = problem.nodes, problem.request, len(problem.nodes)
     # The unknowns are densities, and a flow for each opening.
-    size = count + len(nodes.openings)
+    size = count + len(flow)
     matrix, linear = np.zeros((size, size)), np.zeros(size)
     share = 2.0 / (len(problem.films) * problem.films[0].shape[1])
     # The mean of the best known film is held at the target by this weight. The levels of the
@@ -124,7 +117,7 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     linear[:count] -= 2.0 * weight * level
     for films in problem.films:
         scaled = films / problem.target_um
-        error = now.density @ films / problem.target_um - 1.0
+        error = density @ films / problem.target_um - 1.0
         uneven = scaled - scaled.mean(axis=1, keepdims=True)
         matrix[:count, :count] += share * uneven @ uneven.T
         for beyond, edge, weight in _hinges(problem, error):
@@ -138,11 +131,11 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     np.add.at(weights, pairs, 0.5 * steps_m)
     np.add.at(weights, pairs + 1, 0.5 * steps_m)
     linear[:count] += request.paint_weight * weights / problem.original_s
-    flow = now.flow[nodes.opening]
-    linear[:count] += request.time_weight * weights / (flow * problem.original_s)
-    seconds = np.bincount(nodes.opening, weights * now.density / flow, len(now.flow))
-    linear[count:] -= request.time_weight * seconds / (now.flow * problem.original_s)
-    mean = float(weights @ now.density / weights.sum())
+    at_nodes = flow[nodes.opening]
+    linear[:count] += request.time_weight * weights / (at_nodes * problem.original_s)
+    seconds = np.bincount(nodes.opening, weights * density / at_nodes, len(flow))
+    linear[count:] -= request.time_weight * seconds / (flow * problem.original_s)
+    mean = float(weights @ density / weights.sum())
     unit = np.eye(size)
     slope = (unit[pairs + 1] - unit[pairs]) / mean
     # Smoothness is that of slowness over this length [m].
@@ -151,7 +144,7 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     # Keeps the problem definite where no film says more, and flows where they are.
     matrix[np.diag_indices(count)] += 1e-9 * matrix.max()
     matrix[np.arange(count, size), np.arange(count, size)] += 1e-4
-    linear[count:] -= 1e-4 * now.flow
+    linear[count:] -= 1e-4 * flow
     return matrix, linear
 
 
@@ -171,9 +164,10 @@ def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float
     return found
 
 
-def _constraints(problem: Problem, now: Density) -> Constraints:
+def _constraints(problem: Problem, density: np.ndarray, flow: np.ndarray) -> Constraints:
+    slowness = density / flow[problem.nodes.opening]
     nodes, limits, count = problem.nodes, problem.request, len(problem.nodes)
-    unit = identity(count + len(nodes.openings), format='csr')
+    unit = identity(count + len(flow), format='csr')
     # At each node: the density, and the flow of its opening.
     y, f, closable = unit[:count], unit[count + nodes.opening], problem.open_ends
     greatest, limited_by = problem.bounds
@@ -193,7 +187,7 @@ def _constraints(problem: Problem, now: Density) -> Constraints:
     rise = y[pairs + 1] - y[pairs]
     for node in (pairs, pairs + 1):
         # y^3 / f^2 about (y0, f0) is 3 (y0/f0)^2 y - 2 (y0/f0)^3 f.
-        ratio = now.slowness(nodes)[node]
+        ratio = slowness[node]
         most = diags(3.0 * reach * ratio**2) @ y[node] - diags(2.0 * reach * ratio**3) @ f[pairs]
         rows += [(ACCELERATION, rise - most, none), (ACCELERATION, -rise - most, none)]
     # y^4 / f^3, for the change of slowness by the jerk alone.
@@ -201,12 +195,12 @@ def _constraints(problem: Problem, now: Density) -> Constraints:
     reach = (
         limits.jerk_m_per_s3 * (0.5 * (nodes.travel_m[inner + 1] - nodes.travel_m[inner - 1])) ** 2
     )
-    ratio = now.slowness(nodes)[inner]
+    ratio = slowness[inner]
     bend = y[inner + 1] - 2.0 * y[inner] + y[inner - 1]
     most = diags(4.0 * reach * ratio**3) @ y[inner] - diags(3.0 * reach * ratio**4) @ f[inner]
     rows += [(JERK, bend - most, none), (JERK, -bend - most, none)]
-    rows.append((FLOW, unit[count:], limits.flow[1] * nodes.given_flow))
-    rows.append((FLOW, -unit[count:], -limits.flow[0] * nodes.given_flow))
+    rows.append((FLOW, unit[count:], limits.flow[1] * problem.given_flow))
+    rows.append((FLOW, -unit[count:], -limits.flow[0] * problem.given_flow))
     names, matrices, ends = zip(
         *(row for row in rows if row[1].shape[0] and row[0] not in problem.left_out), strict=True
     )

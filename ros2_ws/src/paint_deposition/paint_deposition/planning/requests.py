@@ -182,34 +182,6 @@ class PlanRequest(SpeedLimits, PassRequest):
             return self.index_m, self.index_m
         return self.index_min_m or 0.75 * best_m, self.index_max_m or 1.25 * best_m
 
-    def improvement(
-        self,
-        overspray_m: float,
-        target_um: float | None,
-        paint: float = 1.0,
-        time: float = 1.0,
-        **others: float,
-    ) -> 'ImproveRequest':
-        """For the speeds along the passes; the gun may be closed up to the edge of the part.
-
-        ``paint`` is that of the passes to begin with over that of the film on the part, ``time``
-        that with the gun open over the whole of the plan without speeds along its passes.
-        """
-        names = (*SpeedLimits.model_fields, 'acceleration_m_per_s2')
-        limits = {name: getattr(self, name) for name in names}
-        return ImproveRequest(
-            **limits, target_um=target_um, trigger_cut_m=overspray_m,
-            paint_weight=paint * self.paint_weight, time_weight=time * self.time_weight, **others,
-        )  # fmt: skip
-
-    def for_plane(self, width_m: float, length_m: float) -> IndexRequest:
-        """For a plane of the part's size, at any speed: a part needs another than its plane."""
-        shared = {name: getattr(self, name) for name in PassRequest.model_fields}
-        return IndexRequest(
-            **shared, width_m=width_m, length_m=length_m, speed_min_m_per_s=SLOWEST_M_PER_S,
-            speed_max_m_per_s=FASTEST_M_PER_S,
-        )  # fmt: skip
-
 
 class ImproveRequest(SpeedLimits):
     """A more even film along the path of a programme: what is wanted, and what is allowed.

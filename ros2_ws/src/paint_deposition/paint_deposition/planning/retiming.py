@@ -13,9 +13,9 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.nodes import FilmAtPoints, Nodes, retime, speed_bounds
 from paint_deposition.planning.passes import PlannedPass
 from paint_deposition.planning.planned_film import WantedFilm, stratified_sample
-from paint_deposition.planning.programme import Opening, Programme, moves_of
-from paint_deposition.planning.quadratic_program import Density, Problem, solve
-from paint_deposition.planning.requests import ImproveRequest, PlanRequest
+from paint_deposition.planning.programme import Programme, moves_of
+from paint_deposition.planning.quadratic_program import Problem, solve
+from paint_deposition.planning.requests import ImproveRequest, PlanRequest, SpeedLimits
 
 # Rounds of the solver where an approximate solution is enough: triggers, and the cost of limits.
 ROUGH_ROUNDS = 3
@@ -66,72 +66,74 @@ def retime_for_evenness(
     narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
     # Nodes per width of the pattern, within bounds.
     spacing_m = min(max(narrow / 2.0, 0.015), 0.05)
-    flow = np.array([opening.flow for opening in original.openings])
     lengths_m = np.diff(original.ends_m)[:, 0]
     seconds, level = np.diff(original.seconds_at(original.ends_m))[:, 0], target_um / mean_um
+    fastest, slowest = request.speed_max_m_per_s, request.speed_min_m_per_s
+    # (m,) density of paint that is the original mean of each opening.
+    even = original.flow * np.clip(level * seconds / lengths_m, 1.0 / fastest, 1.0 / slowest)
 
-    def timed_at(nodes: Nodes, density: Density) -> Programme:
-        flows = zip(nodes.openings, density.flow.tolist(), strict=True)
-        openings = tuple(replace(opening, flow=flow) for opening, flow in flows)
-        programme = replace(original, openings=openings)
-        return retime(programme, nodes, density.slowness(nodes), request)
+    def timed_at(nodes: Nodes, density: np.ndarray, flow: np.ndarray) -> Programme:
+        programme = replace(original, ends_m=nodes.ends_m, flow=flow)
+        return retime(programme, nodes, density / flow[nodes.opening], request)
 
     def problem_about(
-        nodes: Nodes, density: Density | None, open_ends: np.ndarray
-    ) -> tuple[Problem, Density]:
-        """The problem about a density; without one, about the original mean of each opening."""
-        bounds = speed_bounds(replace(original, openings=nodes.openings), nodes, request)
-        if density is None:
-            fastest, slowest = request.speed_max_m_per_s, request.speed_min_m_per_s
-            slowness = np.clip(level * seconds / lengths_m, 1.0 / fastest, 1.0 / slowest)
-            density = Density((flow * slowness)[nodes.opening], flow)
-        timed = timed_at(nodes, density)
-        of_nodes = [one.of_nodes(timed, nodes, density.density) for one in films]
-        sprayed_s = level * float(flow @ seconds)
+        nodes: Nodes, density: np.ndarray, flow: np.ndarray, open_ends: np.ndarray
+    ) -> Problem:
+        bounds = speed_bounds(replace(original, ends_m=nodes.ends_m), nodes, request)
+        timed = timed_at(nodes, density, flow)
+        of_nodes = [one.of_nodes(timed, nodes, density) for one in films]
+        sprayed_s = level * float(original.flow @ seconds)
         return Problem(
-            of_nodes, target_um, bands, nodes, bounds, request, sprayed_s, open_ends
-        ), density
+            of_nodes, target_um, bands, original.flow, nodes, bounds, request, sprayed_s,
+            open_ends,
+        )  # fmt: skip
 
     # Choose where the gun opens; then solve and simulate in turn until both films agree.
     progress('triggers', 0.0)
-    openings, free = original.openings, []
-    nodes = Nodes.of(widened(original, request), spacing_m)
-    open_ends = _may_be_closed(nodes, openings, request)
+    ends_m, free = original.ends_m, []
+    nodes = Nodes.of(_widened_m(original, request), spacing_m)
+    # (m, 2) latest place at which each opening may begin, and earliest at which it may end: it is
+    # not cut to less than 30 % of its length.
+    cut_m = np.minimum(request.trigger_cut_m, 0.35 * lengths_m)
+    kept_m = original.ends_m + np.outer(cut_m, [1.0, -1.0])
+    latest_m, earliest_m = kept_m[nodes.opening].T
+    open_ends = (nodes.travel_m < latest_m) | (nodes.travel_m > earliest_m)
     if open_ends.any():
-        relaxed, density = problem_about(nodes, None, open_ends)
-        density = solve(relaxed, density, ROUGH_ROUNDS)
-        openings = _openings(relaxed, density.density, openings)
-        free = [(relaxed, density)]
-    nodes = Nodes.of(openings, spacing_m)
+        start = even[nodes.opening], original.flow
+        relaxed = problem_about(nodes, *start, open_ends)
+        density, flow, _ = solve(relaxed, *start, ROUGH_ROUNDS)
+        ends_m = _ends_m(relaxed, density, kept_m)
+        free = [(relaxed, density, flow)]
+    nodes = Nodes.of(ends_m, spacing_m)
     closed = np.zeros(len(nodes), dtype=bool)
-    found: Density | None = None
-    rounds = 4
+    density, flow, rounds = even[nodes.opening], original.flow, 4
     for round_ in range(rounds):
         progress('speeds', round_ / rounds)
-        problem, start = problem_about(nodes, found, closed)
-        found = solve(problem, start)
-        timed = timed_at(nodes, found)
+        problem = problem_about(nodes, density, flow, closed)
+        density, flow, binding = solve(problem, density, flow)
+        timed = timed_at(nodes, density, flow)
         laid = [one.film_um(timed) for one in films]
-        expected = problem.films_um(found)
+        expected = problem.films_um(density)
         off = max(float(np.abs(a - b).max()) for a, b in zip(expected, laid, strict=True))
         # The film of the solution and that of the timed programme agree.
         if off <= 5e-4 * target_um:
             break
-    assert found is not None
     limits: dict[str, float] = {}
     of_path = now = _sigma_n(laid)
     if explain:
-        for number, name in enumerate(found.binding):
-            progress('limits', number / len(found.binding))
+        for number, name in enumerate(binding):
+            progress('limits', number / len(binding))
             freed = replace(problem, left_out=frozenset({name}))
-            without = _sigma_n(freed.films_um(solve(freed, found, ROUGH_ROUNDS)))
+            without = _sigma_n(freed.films_um(solve(freed, density, flow, ROUGH_ROUNDS)[0]))
             # A limit is reported if sigma_n would be lower by 2 % without it.
             if without < 0.98 * now:
                 limits[name] = without
         limits = dict(sorted(limits.items(), key=lambda limit: limit[1]))
-        for one, start in ((problem.relaxed(), found), *((one.relaxed(), s) for one, s in free)):
-            of_path = min(of_path, _sigma_n(one.films_um(solve(one, start, ROUGH_ROUNDS))))
-    return Retiming(original, timed, target_um, found.binding, limits, of_path)
+        for one, near, given in ((problem, density, flow), *free):
+            bare = one.relaxed()
+            most_even, *_ = solve(bare, near, given, ROUGH_ROUNDS)
+            of_path = min(of_path, _sigma_n(bare.films_um(most_even)))
+    return Retiming(original, timed, target_um, binding, limits, of_path)
 
 
 def timed_evenly(
@@ -152,10 +154,16 @@ def timed_evenly(
     for the time that they spray over the cycle time of the plan to begin with.
     """
     sprayed_s = sum((one.off_m - one.on_m) / one.speed_m_per_s for one in passes)
-    asked = request.improvement(
-        passes[0].style.overspray_m, target_um,
-        paint=model.planar.K1_cm3_per_s * sprayed_s / wanted_cm3, time=sprayed_s / cycle_time_s,
-    )  # fmt: skip
+    sprayed_cm3 = model.planar.K1_cm3_per_s * sprayed_s
+    names = (*SpeedLimits.model_fields, 'acceleration_m_per_s2')
+    asked = ImproveRequest(
+        **{name: getattr(request, name) for name in names},
+        target_um=target_um,
+        # The gun may be closed up to the edge of the part.
+        trigger_cut_m=passes[0].style.overspray_m,
+        paint_weight=sprayed_cm3 / wanted_cm3 * request.paint_weight,
+        time_weight=sprayed_s / cycle_time_s * request.time_weight,
+    )
     original = Programme.of(trajectory)
     retimed = retime_for_evenness(
         surface, wanted, original, [model], asked, progress, explain=False
@@ -171,21 +179,18 @@ def _sigma_n(films_um: Sequence[np.ndarray]) -> float:
 # --- where the gun opens and closes: the ends of the openings, from a relaxed problem
 
 
-def widened(programme: Programme, request: ImproveRequest) -> tuple[Opening, ...]:
-    """The openings with all places at which the gun might open earlier or close later."""
-    found = []
-    last = len(programme.openings) - 1
-    for number, (opening, around) in enumerate(
-        zip(programme.openings, programme.around_m.tolist(), strict=True)
-    ):
-        # Two openings may meet half way between them.
-        back = (0.5 if number else 1.0) * (opening.on_m - around[0])
-        ahead = (0.5 if number < last else 1.0) * (around[1] - opening.off_m)
-        back, ahead = (min(request.trigger_shift_m, room) for room in (back, ahead))
-        on = opening.on_m - _usable_m(programme, opening.on_m, -1.0, back)
-        off = opening.off_m + _usable_m(programme, opening.off_m, 1.0, ahead)
-        found.append(replace(opening, on_m=on, off_m=off))
-    return tuple(found)
+def _widened_m(programme: Programme, request: ImproveRequest) -> np.ndarray:
+    """(k, 2) ends of the openings with all places where the gun might open or close."""
+    room_m = (programme.ends_m - programme.around_m) * np.array([1.0, -1.0])
+    # Two openings may meet half way between them.
+    room_m[1:, 0] *= 0.5
+    room_m[:-1, 1] *= 0.5
+    most_m = np.minimum(request.trigger_shift_m, room_m).tolist()
+    found = [
+        (on - _usable_m(programme, on, -1.0, back), off + _usable_m(programme, off, 1.0, ahead))
+        for (on, off), (back, ahead) in zip(programme.ends_m.tolist(), most_m, strict=True)
+    ]
+    return np.array(found)
 
 
 def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -> float:
@@ -207,44 +212,23 @@ def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -
     return float(way[np.argmin(good)] if not good.all() else way[-1])
 
 
-def _may_be_closed(
-    nodes: Nodes, original: tuple[Opening, ...], request: ImproveRequest
-) -> np.ndarray:
-    """(n,) bool, nodes so near the original ends that the gun may be closed there."""
-    near = np.zeros(len(nodes), dtype=bool)
-    if not request.trigger_cut_m and not request.trigger_shift_m:
-        return near
-    for number, opening in enumerate(original):
-        rows = nodes.rows(number)
-        place, (first, last) = nodes.travel_m[rows], _kept_m(opening, request)
-        near[rows] = (place < first) | (place > last)
-    return near
+def _ends_m(relaxed: Problem, density: np.ndarray, kept_m: np.ndarray) -> np.ndarray:
+    """(m, 2) where the relaxed density reaches half of the least possible in each opening.
 
-
-def _kept_m(opening: Opening, request: ImproveRequest) -> tuple[float, float]:
-    """Latest place at which an opening may begin, and earliest at which it may end."""
-    # An opening is not cut to less than 30 % of its length.
-    cut = min(request.trigger_cut_m, 0.35 * (opening.off_m - opening.on_m))
-    return opening.on_m + cut, opening.off_m - cut
-
-
-def _openings(
-    relaxed: Problem, density: np.ndarray, original: tuple[Opening, ...]
-) -> tuple[Opening, ...]:
-    """Openings that begin and end where the relaxed density reaches half of the least possible."""
+    It begins no later and ends no earlier than at ``kept_m`` (m, 2).
+    """
     found, nodes = [], relaxed.nodes
-    for number, opening in enumerate(nodes.openings):
+    for number, (latest, earliest) in enumerate(kept_m.tolist()):
         rows = nodes.rows(number)
         place = nodes.travel_m[rows]
-        least = opening.flow / relaxed.bounds[0][rows]
+        least = relaxed.given_flow[number] / relaxed.bounds[0][rows]
         worth = (density[rows] - 0.5 * least) / least
         kept = np.flatnonzero(~relaxed.open_ends[rows] | (worth > 0.0))
         first, last = int(kept[0]), int(kept[-1])
-        latest, earliest = _kept_m(original[number], relaxed.request)
         on = min(_crossing_m(place, worth, first, first - 1), latest)
         off = max(_crossing_m(place, worth, last, last + 1), earliest)
-        found.append(replace(opening, on_m=on, off_m=off))
-    return tuple(found)
+        found.append((on, off))
+    return np.array(found)
 
 
 def _crossing_m(place_m: np.ndarray, worth: np.ndarray, inside: int, outside: int) -> float:

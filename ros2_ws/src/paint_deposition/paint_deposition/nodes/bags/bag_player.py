@@ -40,7 +40,7 @@ from paint_deposition.files.recordings.pose_topics import (
 )
 from paint_deposition.motion.trajectory import relative_flow
 from paint_deposition.nodes import topics
-from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
+from paint_deposition.nodes.bags.pace import Pace
 from paint_deposition.nodes.node import OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
 from paint_deposition.nodes.topics import header, header_stamp_ns, pose_message, state_message
@@ -134,16 +134,16 @@ class BagPlayer(PaintNode):
         self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
         self._clock_publisher: Publisher | None = None
         self._clock_order = threading.Lock()
-        self._time = ReplayClock(values['rate'], running=not values['start_paused'])
+        self._pace = Pace(
+            self, self._pose_publisher, self.stopped, rate=values['rate'],
+            window=values['window'], running=not values['start_paused'],
+        )  # fmt: skip
         if values['publish_clock']:
             self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
             self.create_steady_timer(0.01, self._publish_clock)
         self.create_service(Trigger, '~/pause', lambda *_: self._set_running(False))
         self.create_service(Trigger, '~/resume', lambda *_: self._set_running(True))
         self._subscribers_to_await = values['wait_for_subscribers']
-        self._flow_control = FlowControl(
-            self, self._pose_publisher, values['window'], self.stopped
-        )
         self.poses_published = self.states_published = 0
         self.start_thread(self._replay)
         return {'replay': self.status}
@@ -183,8 +183,8 @@ class BagPlayer(PaintNode):
     # --- called by the executor
 
     def _set_running(self, running: bool) -> Trigger.Response:
-        changes = self._time.running != running
-        self._time.change(running=running)
+        changes = self._pace.running != running
+        self._pace.change(running=running)
         if changes:
             message = 'resumed' if running else 'paused'
         else:
@@ -195,8 +195,8 @@ class BagPlayer(PaintNode):
         if self._clock_publisher and self.count_publishers('/clock') > 1:
             jumps = 'another node publishes /clock, too: time jumps for nodes with use_sim_time'
             return WARN, f'{jumps}; set publish_clock to false for one of them', {}
-        status = self._flow_control.status if self._time.running else 'paused'
-        ahead = self._flow_control.lag(time.monotonic())
+        status = self._pace.status if self._pace.running else 'paused'
+        ahead = self._pace.lag(time.monotonic())
         values = {
             'bag': self.values['bag'],
             'poses published': self.poses_published,
@@ -214,21 +214,17 @@ class BagPlayer(PaintNode):
                 for message in self._messages(bag):
                     if not begun:
                         begun = True
-                        self._time.change(started=False, time_ns=message.log_time_ns)
-                        self._flow_control.wait_for_subscribers(self._subscribers_to_await)
+                        self._pace.change(started=False, time_ns=message.log_time_ns)
+                        self._pace.wait_for_subscribers(self._subscribers_to_await)
                         self._subscribers_to_await = 0  # when looping
-                        self._time.change(started=True)
-                    # Wait for the end of a pause, the time of the message, and the flow control.
-                    self._time.wait_for(message.log_time_ns, self.stopped)
-                    if self.values['rate'] == 0.0:
-                        self._flow_control.wait_for_lag_below(self.values['window'])
-                        self._time.change(time_ns=message.log_time_ns)
+                        self._pace.change(started=True)
+                    self._pace.wait_for(message.log_time_ns)
                     if self.stopped.is_set():
                         break
                     self._publish(message, bag)
-            self._time.change(started=False)
+            self._pace.change(started=False)
             self._publish_clock()
-            self._flow_control.wait_until_taken()
+            self._pace.wait_until_taken()
             if not self.values['loop']:
                 break
         self.finish()
@@ -255,7 +251,7 @@ class BagPlayer(PaintNode):
 
     def _publish(self, message: RawMessage, bag: Bag) -> None:
         if message.topic == self._pose_topic:
-            self._flow_control.add_sent(header_stamp_ns(message.cdr), time.monotonic())
+            self._pace.add_sent(header_stamp_ns(message.cdr), time.monotonic())
             self._pose_publisher.publish(message.cdr)
             self.poses_published += 1
         elif message.type == PART_POSE_TYPE:  # it becomes a static transform
@@ -282,6 +278,6 @@ class BagPlayer(PaintNode):
 
     def _publish_clock(self) -> None:
         with self._clock_order:
-            time_ns = self._time.time_ns
+            time_ns = self._pace.time_ns
             if self._clock_publisher and time_ns is not None:
                 self._clock_publisher.publish(Clock(clock=Time(nanoseconds=time_ns).to_msg()))

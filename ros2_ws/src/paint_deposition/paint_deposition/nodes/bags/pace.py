@@ -21,20 +21,63 @@ ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
 LOST_TIMEOUT_S = 5.0
 
 
-class ReplayClock:
-    """Bag time as a function of the steady clock; thread-safe.
+@dataclass
+class Subscriber:
+    """Number of poses taken, monotonic times of the last progress and the last report.
 
-    It does not advance before it is started and while it is paused. `rate` is bag seconds per
-    second; at 0, time is changed from message to message. `running` is False while paused.
+    `lost` poses never reached it.
     """
 
-    def __init__(self, rate: float, running: bool = True) -> None:
-        self._rate = rate
+    taken: int
+    advanced_s: float
+    reported_s: float = -math.inf
+    lost: int = 0
+
+
+class Pace:
+    """The time in the bag, by the steady clock, and how far a replay is ahead of its subscribers.
+
+    Time does not advance before it is started and while it is paused. `rate` is bag seconds per
+    second; at 0 time goes from message to message, and the publisher of the poses stays at most
+    `window` poses ahead of its subscribers.
+
+    It waits for each pose to be reported by the subscribers that publish PoseProgress on
+    `atomizer/progress`, and for the middleware's acknowledgement by the others. A subscriber that
+    joins, or joins again, starts with the next pose. Its reports identify the newest pose it has
+    taken by the stamp; poses lost before that one are not waited for.
+
+    The waiting methods are for one thread beside the executor, and return early once `stopped` is
+    set. All times in seconds are monotonic.
+
+    Attributes:
+        running: False while paused.
+        subscribers: those present that report, by their full names.
+        status: what is waited for.
+    """
+
+    def __init__(
+        self, node: Node, publisher: Publisher, stopped: threading.Event, *, rate: float,
+        window: int, running: bool,
+    ) -> None:  # fmt: skip
+        self._node, self._publisher, self._stopped = node, publisher, stopped
+        self._rate, self._window = rate, window
         self._changed = threading.Condition()
         self._time_ns: int | None = None
         self._since_s: float | None = None  # steady time at _time_ns; None while stopped
-        self._started = False
-        self.running = running
+        self._started, self.running = False, running
+        self._sent, self._sent_s = 0, 0.0
+        # Larger than the largest window.
+        self._stamps: deque[int] = deque(maxlen=20_000)
+        self.subscribers: dict[str, Subscriber] = {}
+        self._discovered_s = -math.inf
+        self.status = 'starting'
+        node.create_subscription(
+            PoseProgress, PROGRESS_TOPIC,
+            lambda said: self.report(said.reporter, stamp_ns(said.header), time.monotonic()),
+            PROGRESS,
+        )  # fmt: skip
+
+    # --- time in the bag
 
     @property
     def time_ns(self) -> int | None:
@@ -58,10 +101,10 @@ class ReplayClock:
             self._since_s = time.monotonic() if goes else None
             self._changed.notify_all()
 
-    def wait_for(self, time_ns: int, stopped: threading.Event) -> None:
-        """Wait for that time, at rate 0 only for the end of a pause; no longer once stopped."""
+    def wait_for(self, time_ns: int) -> None:
+        """Wait for the end of a pause, and for that time, at rate 0 for the subscribers."""
         with self._changed:
-            while not stopped.is_set():
+            while not self._stopped.is_set():
                 now_ns, left_s = self.time_ns, math.inf
                 if self._rate == 0.0 and self.running:
                     left_s = 0.0
@@ -70,65 +113,22 @@ class ReplayClock:
                 if left_s <= 0.0:
                     break
                 self._changed.wait(min(left_s, 0.05))
-
-
-@dataclass
-class Subscriber:
-    """Number of poses taken, monotonic times of the last progress and the last report.
-
-    `lost` poses never reached it.
-    """
-
-    taken: int
-    advanced_s: float
-    reported_s: float = -math.inf
-    lost: int = 0
-
-
-class FlowControl:
-    """Keeps a publisher of poses at most `window` poses ahead of its subscribers.
-
-    It waits for each pose to be reported by the subscribers that publish PoseProgress on
-    `atomizer/progress`, and for the middleware's acknowledgement by the others. A subscriber that
-    joins, or joins again, starts with the next pose. Its reports identify the newest pose it has
-    taken by the stamp; poses lost before that one are not waited for.
-
-    The waiting methods are for one thread beside the executor, and return early once `stopped` is
-    set. All times are monotonic seconds.
-
-    Attributes:
-        subscribers: those present that report, by their full names.
-        status: what is waited for.
-    """
-
-    def __init__(self, node: Node, publisher: Publisher, window: int, stopped: threading.Event):
-        self._node, self._publisher = node, publisher
-        self._window, self._stopped = window, stopped
-        self._lock = threading.Lock()
-        self._sent, self._sent_s = 0, 0.0
-        # Larger than the largest window.
-        self._stamps: deque[int] = deque(maxlen=20_000)
-        self.subscribers: dict[str, Subscriber] = {}
-        self._discovered_s = -math.inf
-        self.status = 'starting'
-        node.create_subscription(
-            PoseProgress, PROGRESS_TOPIC,
-            lambda said: self.report(said.reporter, stamp_ns(said.header), time.monotonic()),
-            PROGRESS,
-        )  # fmt: skip
+        if self._rate == 0.0:
+            self.wait_for_lag_below(self._window)
+            self.change(time_ns=time_ns)
 
     # --- who has taken what
 
     def add_sent(self, stamp_ns: int, now_s: float) -> None:
         """Add a pose that is about to be published, by its stamp."""
-        with self._lock:
+        with self._changed:
             self._sent += 1
             self._sent_s = now_s
             self._stamps.append(stamp_ns)
 
     def set_subscribers(self, names: Iterable[str], now_s: float) -> None:
         """Set the subscribers that are present now; others are no longer waited for."""
-        with self._lock:
+        with self._changed:
             known = self.subscribers
             self.subscribers = {
                 name: known.get(name) or Subscriber(self._sent, now_s) for name in sorted(names)
@@ -136,7 +136,7 @@ class FlowControl:
 
     def report(self, name: str, stamp_ns: int, now_s: float) -> None:
         """Set the newest pose that a subscriber has taken."""
-        with self._lock:
+        with self._changed:
             # Of poses with equal stamps, the newest.
             back = next((k for k, s in enumerate(reversed(self._stamps)) if s == stamp_ns), None)
             taken = 0 if back is None else self._sent - back
@@ -147,7 +147,7 @@ class FlowControl:
 
     def lag(self, now_s: float) -> dict[str, int]:
         """Number of poses that each subscriber still has to take, and has not lost."""
-        with self._lock:
+        with self._changed:
             behind = {}
             for name, subscriber in self.subscribers.items():
                 left = self._sent - subscriber.taken

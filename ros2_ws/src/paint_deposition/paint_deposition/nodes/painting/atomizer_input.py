@@ -155,7 +155,22 @@ class AtomizerInput:
             self._place()
         else:
             self.state_sent_ns = max(self.state_sent_ns, sent_ns)
-            self._switch(message)
+            try:
+                change = trigger_change(message)
+                self._node.film.guns[self._number].add_trigger(change)
+            except PaintError as error:
+                if str(error) not in self.state_errors and len(self.state_errors) < MOST_NAMES:
+                    self._node.get_logger().error(f'{self._state_topic} refused: {error}')
+                    self.state_errors.add(str(error))
+                self.anomalies[STATES_REFUSED] += 1
+                return
+            if message.spraying and change.flow == 0.0:
+                without_flow = 'states that spray with flow 0'
+                if not self.anomalies[without_flow]:
+                    self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
+                self.anomalies[without_flow] += 1
+            self.spraying = change.flow > 0.0
+            self.programmed_m_per_s = message.programmed_speed_m_per_s
 
     # --- batches
 
@@ -252,26 +267,6 @@ class AtomizerInput:
                     f"frame '{frame.frame_id}' and {placed}"
                 )
             self.refused_frames[frame_id] += 1
-
-    # --- states
-
-    def _switch(self, message: AtomizerState) -> None:
-        try:
-            change = trigger_change(message)
-            self._node.film.guns[self._number].add_trigger(change)
-        except PaintError as error:
-            if str(error) not in self.state_errors and len(self.state_errors) < MOST_NAMES:
-                self._node.get_logger().error(f'{self._state_topic} refused: {error}')
-                self.state_errors.add(str(error))
-            self.anomalies[STATES_REFUSED] += 1
-            return
-        if message.spraying and change.flow == 0.0:
-            without_flow = 'states that spray with flow 0'
-            if not self.anomalies[without_flow]:
-                self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
-            self.anomalies[without_flow] += 1
-        self.spraying = change.flow > 0.0
-        self.programmed_m_per_s = message.programmed_speed_m_per_s
 
     def _report_progress(self) -> None:
         message = PoseProgress(

@@ -11,11 +11,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from std_srvs.srv import Trigger
 
 from paint_deposition.nodes.node import Task
-from paint_deposition.nodes.painting.film_display import (
-    FilmDisplay,
-    laid_by_gun,
-    statistics_of,
-)
+from paint_deposition.nodes.painting.film_display import FilmDisplay, film_figures
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
@@ -74,7 +70,7 @@ class DepositionSimulator(PaintingNode):
         self.display = FilmDisplay(self)
         self.parts = PartChange(self, version, self._saving, saving)
         self.publish()
-        return {**tasks, 'film': self.display.film_status, 'part': self.parts.status}
+        return {**tasks, 'part': self.parts.status}
 
     def _cleanup(self) -> None:
         self.parts.close()
@@ -151,17 +147,17 @@ class DepositionSimulator(PaintingNode):
         }
 
         def write() -> list[Path]:
+            film_um = film.film_um
+            figures, *by_gun = film_figures(values, surface, film, film_um, zones)
             details['atomizers'] = [
                 {
                     'name': name, 'model_file': file, 'painted_volume_cm3': laid_cm3,
                     'share': share, 'emitted_volume_cm3': gun.used.emitted_cm3, 'poses': poses,
                 }
                 for name, file, laid_cm3, share, gun, poses in zip(
-                    names, files, *laid_by_gun(surface, film), film.guns, counts, strict=True
+                    names, files, *by_gun, film.guns, counts, strict=True
                 )
             ]  # fmt: skip
-            film_um = film.film_um
-            figures = statistics_of(values, surface, film_um, film.used.emitted_cm3, zones)
             if any(gun.model.brushes for gun in film.guns):
                 details['paint'] = film.used.figures(figures.mean_um, figures.painted_volume_cm3)
             return write_film(

@@ -25,12 +25,11 @@ from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FIGURES, FilmStatistics, film_statistics
 from paint_deposition.nodes import topics
-from paint_deposition.nodes.node import OK, WARN, Status
+from paint_deposition.nodes.node import OK, WARN
 from paint_deposition.nodes.painting.atomizer_input import LONGEST_NAME, MOST_NAMES
 from paint_deposition.nodes.painting.health import (
     DOUBTFUL,
     UNPAINTED,
-    film_status,
     sprays_without_poses,
     what_was_wrong,
 )
@@ -53,23 +52,24 @@ from paint_deposition.report.colour_scales import TABLE, ColourScale, film_scale
 ACKNOWLEDGE_TIMEOUT_S = 5.0
 
 
-def statistics_of(
+def film_figures(
     values: Mapping[str, Any],
     surface: Surface,
+    film: CommonFilm,
     film_um: np.ndarray,
-    emitted_cm3: float,
     zones: Zones | None,
-) -> FilmStatistics:
-    """The statistics of a film (V,), by the targets and the thresholds among the parameters."""
+) -> tuple[FilmStatistics, list[float], list[float]]:
+    """The statistics of a film (V,), by the targets and the thresholds among the parameters.
+
+    After them come the solids that each gun laid on the part [cm3], and its share of them, 0 to 1;
+    0 without any paint.
+    """
     chosen = {k: values[k] for k in ('painted_above_um', 'target_um', 'target_tolerance_um')}
-    return film_statistics(film_um, surface.vertex_areas_m2, emitted_cm3, zones=zones, **chosen)
-
-
-def laid_by_gun(surface: Surface, film: CommonFilm) -> tuple[list[float], list[float]]:
-    """Solids that each gun laid on the part [cm3], and its share, 0 to 1; 0 without any paint."""
-    laid_cm3 = film.laid_cm3(surface.vertex_areas_m2).tolist()
+    area_m2, emitted_cm3 = surface.vertex_areas_m2, film.used.emitted_cm3
+    laid_cm3 = film.laid_cm3(area_m2).tolist()
     total = sum(laid_cm3)
-    return laid_cm3, [laid / total if total else 0.0 for laid in laid_cm3]
+    shares = [laid / total if total else 0.0 for laid in laid_cm3]
+    return film_statistics(film_um, area_m2, emitted_cm3, zones=zones, **chosen), laid_cm3, shares
 
 
 def cloud_message(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
@@ -164,7 +164,6 @@ class FilmDisplay:
         self._film_um = np.empty(0)
         self._scale = film_scale(self._film_um)
         self._legend_ends: tuple[float, float] | None = None
-        self._publish_duration_s = 0.0
         # Of each gun and reporter: stamp of its newest pose, and when it said so.
         self._reports: dict[tuple[str, str], tuple[int, float]] = {}
         self._trust = node.create_publisher(DiagnosticStatus, topics.TRUST_TOPIC, topics.LATCHED)
@@ -173,14 +172,6 @@ class FilmDisplay:
             take = partial(self._take_report, source.name)
             node.create_subscription(PoseProgress, topic, take, topics.PROGRESS)
         node.create_steady_timer(0.5, self._publish_trust)
-
-    def film_status(self) -> Status:
-        """The status of the film, and the share that each gun has in it."""
-        level, words, values = film_status(self._node)
-        parts = zip(self._stats.atomizers, self._stats.atomizer_share, strict=True)
-        each = {f'share of {gun}': f'{share:.1%}' for gun, share in parts if gun}
-        took = {'last publication [ms]': f'{self._publish_duration_s * 1e3:.0f}'}
-        return level, words, {**values, **took, **each}
 
     def _take_report(self, gun: str, report: PoseProgress) -> None:
         key = gun, report.reporter[:LONGEST_NAME]
@@ -218,7 +209,6 @@ class FilmDisplay:
 
     def show(self, film: CommonFilm, changed: bool, run: str) -> None:
         """Publish the film if it has changed, or to new subscribers."""
-        began_s = time.monotonic()
         if self._surface is not self._node.surface:  # another part, or the same turned
             self._surface, self._mesh, self._legend_ends = self._node.surface, None, None
         at = header(self._node.frame.frame_id, self._node.film.newest_ns or 0)
@@ -234,8 +224,6 @@ class FilmDisplay:
             make[topic] = partial(lambda k: field_message(surface, film.shares_um[k], at), gun)
         for topic, message in make.items():
             self._large[topic].publish_if_wanted(self._version, message)
-        if changed:
-            self._publish_duration_s = time.monotonic() - began_s
         # The statistics are published when a count has changed, too.
         node, message = self._node, self._stats
         refused = sum(source.refused_frames.total() for source in node.inputs)
@@ -252,10 +240,9 @@ class FilmDisplay:
         node, values = self._node, self._node.values
         self._version += 1
         self._film_um = film.film_um
-        figures = statistics_of(
-            values, node.surface, self._film_um, film.used.emitted_cm3, node.zones
+        figures, laid_cm3, shares = film_figures(
+            values, node.surface, film, self._film_um, node.zones
         )
-        laid_cm3, shares = laid_by_gun(node.surface, film)
         self._stats = ThicknessStats(
             header=at,
             run=run,
@@ -264,6 +251,7 @@ class FilmDisplay:
             atomizer_share=shares,
             **{name: getattr(figures, name) for name in FIGURES},
         )
+        node.shares = dict(zip(node.gun_names, shares, strict=True))
         self._counts = None
         self._scale = film_scale(self._film_um, values['color_min_um'], values['color_max_um'])
         ends = self._scale.low, self._scale.high

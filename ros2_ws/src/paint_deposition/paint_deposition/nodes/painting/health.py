@@ -122,7 +122,7 @@ def _state_of_another_type(node: PaintingNode, gun: str) -> str:
 
 
 def film_status(node: PaintingNode) -> Status:
-    """The status of part, model and computing time."""
+    """The status of part, model, computing time and the share of each gun."""
     guns = node.film.guns
     # Computing time over duration of the motion; above 1 the node falls behind.
     sums = [np.sum(source.times_s, axis=0) for source in node.inputs if source.times_s]
@@ -137,6 +137,7 @@ def film_status(node: PaintingNode) -> Status:
         'effects': ' '.join(effects) or 'none',
         'poses remembered': sum(gun.log.poses for gun in guns),
         'real-time factor': f'{factor:.2f}',
+        **{f'share of {gun}': f'{share:.1%}' for gun, share in node.shares.items() if gun},
         **{f'note {number}': note for number, note in enumerate(node.surface.notes, start=1)},
     }
     if node.model_problem:

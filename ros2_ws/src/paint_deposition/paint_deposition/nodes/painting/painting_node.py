@@ -52,6 +52,7 @@ class PaintingNode(ManagedNode, ABC):
         inputs: the subscriptions, one for each gun.
         repainting: films with other models, once a thread has compiled these and repainted the
             motion so far; None if that is not under way.
+        shares: of the guns in the film shown, 0 to 1, by their names.
         model_problem: why the models that were set last are not in use, '' if they are.
     """
 
@@ -65,6 +66,7 @@ class PaintingNode(ManagedNode, ABC):
         self.mesh_file: str = self.values['mesh_file']
         self.model_problem = ''
         self._noted: set[str] = set()
+        self.shares: dict[str, float] = {}
         self.frame = PartFrame(self, self.values['frame_id'])
         self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
         self.models, self._files = models_from_parameters(self.values)
