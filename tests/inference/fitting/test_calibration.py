@@ -71,6 +71,7 @@ def test_true_values_lie_in_their_intervals(panel):
         truth = getattr(TRUTH.planar, name)
         assert value.low - 0.3 * value.sigma <= truth <= value.high + 0.3 * value.sigma, value
     assert calibrated.chi_square_per_freedom == pytest.approx(1.0, abs=0.6)
+    assert not calibrated.is_incomplete
     assert by_name['K1_cm3_per_s'].determined
     assert not by_name['phi_rad'].determined
 
@@ -87,6 +88,10 @@ def test_a_pattern_that_no_bell_has_is_named_as_what_the_model_lacks(panel):
     assert f'no usual bell has {strange[0].value:.2f} m; what the model lacks may have driven' in (
         ' '.join(calibrated.warnings)
     )
+    # It comes first, and no reading is blamed.
+    assert calibrated.is_incomplete
+    assert 'find it with paint diagnose, and plan with its model' in calibrated.warnings[0]
+    assert not any('measure there again' in warning for warning in calibrated.warnings)
 
 
 def test_crosswise_passes_determine_the_asymmetry(panel):

@@ -97,21 +97,21 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
         yield f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
     for planar in result.model.patterns:
         yield f'SB50 of one pass, along tool x: {1e3 * sb50_m(planar):.0f} mm'
-    for experiment, found in zip(result.study.campaign.experiments, result.residuals, strict=True):
+    for experiment, own in zip(result.study.campaign.experiments, result.residuals, strict=True):
         yield (
-            f'{experiment.name}: {len(found)} points, mean {found.measured_um.mean():.2f} µm '
-            f'measured, {found.predicted_um.mean():.2f} predicted, residual SD '
-            f'{found.sd_um:.2f} µm'
+            f'{experiment.name}: {len(own)} points, mean {own.measured_um.mean():.2f} µm '
+            f'measured, {own.predicted_um.mean():.2f} predicted, residual SD {own.sd_um:.2f} µm'
         )
     noise = result.study.noise
     yield (
         f'chi2 per degree of freedom {result.chi_square_per_freedom:.2f}, gauge noise '
         f'{noise.typical_um:.2f} µm ({noise.source})'
     )
-    if result.discrepancy and result.discrepancy.footprint_of_peak:
+    found = result.discrepancy
+    if found and found.footprint_of_peak and not result.is_incomplete:
         yield (
             'the footprint differs from two Gaussians by '
-            f'{100.0 * result.discrepancy.footprint_of_peak:.0f} % of its peak; '
+            f'{100.0 * found.footprint_of_peak:.0f} % of its peak; '
             'paint refit CAMPAIGN --add learned:footprint learns it'
         )
 

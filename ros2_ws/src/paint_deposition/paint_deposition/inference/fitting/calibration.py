@@ -47,6 +47,8 @@ from paint_deposition.inference.readings.readings import Residuals
 
 # Residuals beyond this many standard deviations are named in a warning.
 OUTLIER_SIGMAS = 4.0
+# Above this chi-square per degree of freedom the gauge's noise does not explain the residuals.
+MOST_CHI_SQUARE = 2.0
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,11 @@ class Calibration:
         """About 1 where only the gauge's noise is left."""
         return self.fit.marginal.chi_square_per_freedom
 
+    @property
+    def is_incomplete(self) -> bool:
+        """Whether more is left than noise: something is missing from the model."""
+        return self.chi_square_per_freedom > MOST_CHI_SQUARE
+
 
 @on_one_thread
 def calibrate(
@@ -187,8 +194,8 @@ def calibrate(
     moved = shifts(study, fit, reaches, best_fit)
     values, pairs = estimates(fit.marginal, moved), correlations(fit.marginal, moved)
     widened = 'the intervals are widened by what the fit changes without the readings at the ends'
-    warnings = [f'{reach}; {widened}' for reach in reaches]
-    warnings += [*impossible_brushes(fit.model), *_warnings(study, fit, values, pairs)]
+    warnings = [*_warnings(study, fit, values, pairs), *impossible_brushes(fit.model)]
+    warnings += [f'{reach}; {widened}' for reach in reaches]
     residuals = study.residuals_by_experiment(fit.predicted_um)
     return Calibration(study, fit, values, pairs, residuals, panels, tuple(warnings), moved)
 
@@ -230,6 +237,21 @@ def _warnings(
 ) -> list[str]:
     warnings = list(study.left_out)
     warnings += [] if fit.converged else ['the fit did not converge: its values are not final']
+    squares = fit.marginal.chi_square_per_freedom
+    away = np.abs(study.residuals(fit.predicted_um).residual_um) / study.sigma_um
+    far = np.flatnonzero(away > OUTLIER_SIGMAS)
+    if squares > MOST_CHI_SQUARE:
+        warnings.append(
+            f'residuals are {np.sqrt(squares):.1f} times the noise of the gauge: something is '
+            'missing from the model; find it with paint diagnose, and plan with its model'
+        )
+    elif len(far):
+        campaign, worst = study.campaign, np.argmax(away)
+        label = campaign.readings.point[campaign.means.first[worst]]
+        warnings.append(
+            f'{len(far)} of {len(study)} points are off by more than {OUTLIER_SIGMAS:g} standard '
+            f"deviations, most of all point '{label}': measure there again"
+        )
     warnings += [
         f'{value.name} is not determined by these readings: {value.reason}'
         for value in values
@@ -241,22 +263,6 @@ def _warnings(
         for (first, second), value in pairs.items()
         if abs(value) > 0.95
     ]
-    squares = fit.marginal.chi_square_per_freedom
-    # Above this the gauge's noise does not explain the residuals.
-    if squares > 2.0:
-        warnings.append(
-            f'residuals are {np.sqrt(squares):.1f} times the noise of the gauge: something is '
-            'missing from the model; find it with paint diagnose, and plan with its model'
-        )
-    away = np.abs(study.residuals(fit.predicted_um).residual_um) / study.sigma_um
-    far = np.flatnonzero(away > OUTLIER_SIGMAS)
-    if len(far):
-        campaign, worst = study.campaign, np.argmax(away)
-        label = campaign.readings.point[campaign.means.first[worst]]
-        warnings.append(
-            f'{len(far)} of {len(study)} points are off by more than {OUTLIER_SIGMAS:g} standard '
-            f"deviations, most of all point '{label}': measure there again"
-        )
     if study.noise.source == 'assumed':
         warnings.append(
             f'the noise of the gauge is assumed ({study.noise.typical_um:.2f} µm): repeat some '
