@@ -191,13 +191,9 @@ class DiscrepancyFigures:
     def __str__(self) -> str:
         setting, peak = 100.0 * self.setting_share, 100.0 * self.footprint_of_peak
         parts = f', parts painted alike by {100.0 * self.part_share:.1f} %'
-        footprint = (
-            f'the footprint differs from two Gaussians by {peak:.0f} % of its peak'
-            if peak
-            else 'no deviation of the footprint from two Gaussians shows'
-        )
+        footprint = f'; the footprint differs from two Gaussians by {peak:.0f} % of its peak'
         return (
             f'What no law explains: the film of a setting is off by {setting:.1f} % of its peak'
-            f'{parts if self.part_share else ""}, alike over about {1e3 * self.length_m:.0f} mm; '
-            f'{footprint}.'
+            f'{parts if self.part_share else ""}, alike over about {1e3 * self.length_m:.0f} mm'
+            f'{footprint if peak else ""}.'
         )
