@@ -16,7 +16,6 @@ from std_msgs.msg import Bool, Float64, UInt16
 
 from nodes import cell
 from nodes.cell import START_NS
-from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.atomizer_source import AtomizerSource
@@ -239,15 +238,3 @@ def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, 
     told = '/gun has no stamps, and the poses of the robot are sent 29.'
     wait_until(lambda: viewer.reports('atomizer_source: signals', told))
     assert not viewer.heard['atomizer/state']
-
-
-def test_bad_input_is_refused(source):
-    for values, message in (
-        ({'urdf_file': ''}, 'urdf_file and base_link are empty: give the robot, or the frame'),
-        ({'urdf_file': 'nowhere.urdf'}, 'cannot read nowhere.urdf'),
-        ({'flow': '/flow'}, 'flow is given without a trigger'),
-        ({'trigger': '/io > many'}, "trigger is '/io > many': give a topic"),
-        ({'tip_link': 'bell'}, "no link 'bell'"),
-    ):
-        with pytest.raises(PaintError, match=message):
-            source(**values)

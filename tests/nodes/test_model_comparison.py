@@ -135,18 +135,6 @@ def test_a_zero_is_warned_of_once_film_is_expected_there(comparison, robot, read
     assert '; 1 of 40 readings are 0 where the model expects' in node.status()[1]
 
 
-def test_bad_input_is_one_line(comparison):
-    for values, words in (
-        ({'measurements_file': ''}, 'measurements_file is empty'),
-        ({'measurements_file': 'nowhere.csv'}, 'nowhere.csv: no such file'),
-        ({'mesh_file': ''}, 'mesh_file is empty'),
-        ({'mesh_scale': 0.01}, "lie off the part's surface"),
-    ):
-        with pytest.raises(pd.PaintError, match=words) as caught:
-            comparison(**values)
-        assert '\n' not in str(caught.value)
-
-
 @pytest.mark.parametrize('toward_gun', [True, False])
 def test_readings_with_normals_on_a_sheet_that_is_wound_inward(
     comparison, readings, robot, painted, onlooker, wait_until, tmp_path, toward_gun

@@ -10,13 +10,18 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
+from booth import SAMPLES
 from nodes.cell import parameters
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import PaintError
+from paint_deposition.files.model_file import write_model
 from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.parameters import NodeParameter
 from paint_deposition.nodes.topics import coloured_mesh, header, white_marker
 from paint_deposition.report.colour_scales import FILM_PALETTE
-from test_packaging import NODES, table_of
+from robot_arm import URDF
+from test_packaging import NODES, class_of, table_of
 
 TABLE = {
     'rate_hz': NodeParameter(2.0, 'Rate [Hz]', (0.1, 100.0)),
@@ -115,6 +120,63 @@ def test_a_home_folder_is_found_at_the_start_and_later(declared, monkeypatch, tm
     assert node.get_parameter('model_file').value == f'{tmp_path}/b.yaml'
     (result,) = node.set_parameters(parameters(model_file=7))
     assert 'Wrong parameter type' in result.reason
+
+
+PART = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
+READINGS = PART | {'measurements_file': str(SAMPLES / 'panel_study/panel_577.csv')}
+BAG = str(SAMPLES / 'door_horizontal')
+GUNS = PART | {'atomizers': ['left', 'right']}
+REFUSED = {
+    'atomizer_source': [
+        ({}, 'urdf_file and base_link are empty: give the robot, or the frame'),
+        ({'urdf_file': 'nowhere.urdf'}, 'cannot read nowhere.urdf'),
+        ({'urdf_file': str(URDF), 'flow': '/flow'}, 'flow is given without a trigger'),
+        ({'urdf_file': str(URDF), 'trigger': '/io > many'}, "is '/io > many': give a topic"),
+        ({'urdf_file': str(URDF), 'tip_link': 'bell'}, "no link 'bell'"),
+    ],
+    'bag_player': [
+        ({'bag': ''}, 'bag is empty: give the path of a recording'),
+        ({'bag': '/nowhere'}, '/nowhere: no such file; give a bag'),
+        ({'bag': BAG, 'pose_topic': 'atomizer/pos'}, 'its PoseStamped topics: /atomizer/pose'),
+        ({'bag': BAG, 'state_topic': '/gun'}, 'its state topics: /atomizer/state'),
+    ],
+    'deposition_simulator': [
+        (GUNS | {'model_files': ['thin.yaml']}, 'names 1 models for 2 atomizers: give'),
+        (GUNS | {'model_files': 2 * ['thin.yaml'], 'model_file': 'thin.yaml'},
+         'atomizers and model_file another: give model_file'),
+        (GUNS | {'model_files': ['thin.yaml', 'sagging.yaml']},
+         r'left and right differ in what acts on the finished film.*\(sag\)'),
+        (GUNS | {'atomizers': ['left', 'left']}, 'atomizers is .*give different names'),
+        (GUNS | {'atomizers': ['../robot']}, 'atomizers is .*give different names'),
+    ],
+    'model_comparison': [
+        (READINGS | {'measurements_file': ''}, 'measurements_file is empty'),
+        (READINGS | {'measurements_file': 'nowhere.csv'}, 'nowhere.csv: no such file'),
+        (READINGS | {'mesh_file': ''}, 'mesh_file is empty'),
+        (READINGS | {'mesh_scale': 0.01}, "lie off the part's surface"),
+    ],
+    'run_recorder': [
+        ({'mesh_file': '/nowhere.stl'}, 'mesh_file /nowhere.stl: No such file or directory'),
+        ({'output_directory': '/dev/null', 'name': 'run'}, 'cannot create /dev/null/run'),
+    ],
+    'rws_source': [
+        ({}, 'trigger is empty'),
+        ({'trigger': 'a', 'flow': 'a'}, 'a signal is named twice: a a'),
+        ({'trigger': 'a', 'url': 'http://me:secret@127.0.0.1:9'}, 'url holds a login, .*RWS_PASS'),
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('node', REFUSED)
+def test_what_a_node_cannot_start_with_is_refused_in_a_line(node, start, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_model('thin.yaml', DepositionModel())
+    write_model('sagging.yaml', DepositionModel(effects=(Sag.typical(),)))
+    for values, words in REFUSED[node]:
+        with pytest.raises(PaintError, match=words) as refused:
+            start(class_of(node), **values)
+        assert '\n' not in str(refused.value)
+        assert 'secret' not in str(refused.value)
 
 
 @pytest.mark.parametrize('node', NODES)
