@@ -119,20 +119,17 @@ def test_broken_files_are_refused_in_one_line(tmp_path, name, kind, says):
     assert '\n' not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ('size_m', 'options', 'says'),
-    [
+def test_absurd_sizes_are_refused_with_the_remedy(tmp_path):
+    for size_m, options, says in (
         (400.0, {}, 'looks like millimetres; use --mesh-scale 0.001'),
         (0.004, {}, 'only 4 mm large'),
         (0.4, {'scale': 0.0}, 'mesh_scale = 0; give a number above 0'),
         (0.4, {'max_edge_length_m': -0.02}, 'max_edge_length_m = -0.02; give'),
         (0.4, {'down': [0, 0, 0]}, 'down = .*direction of gravity'),
-    ],
-)
-def test_absurd_sizes_are_refused_with_the_remedy(tmp_path, size_m, options, says):
-    path = saved(sheet(size_m), tmp_path / 'part.stl')
-    with pytest.raises(MeshError, match=says):
-        read_mesh(path, **options)
+    ):
+        path = saved(sheet(size_m), tmp_path / 'part.stl')
+        with pytest.raises(MeshError, match=says):
+            read_mesh(path, **options)
 
 
 def test_the_painted_mesh_carries_the_film(tmp_path):

@@ -178,28 +178,22 @@ def test_what_is_left_out_has_its_default(file):
         ('planar: {K2: .1, K2: .2}', 'cannot be read as YAML (line 1: found duplicate key "K2"'),
         ('planar: {K2: 2024-13-45}', 'put such a value in quotes'),
         ('planar:\n  K2: [', 'cannot be read as YAML (line 2: '),
+        ('brushes: {}', ': brushes is empty; give a brush by its number, or planar'),
+        ('brushes: {0: {planar: {}}}', ': brushes: 0 is not a brush number; give 1, 2 and so on'),
+        ('brushes: {1: 3}', ': brushes, 1 is 3; expected the keys '),
+        ('brushes: {1: {planer: {}}}',
+         ": brushes, 1: unknown key 'planer'; did you mean 'planar'?"),
+        ('brushes: {1: {planar: {}, solids: 45}}',
+         ': brushes, 1: solids is 45; expected a number'),
+        ('brushes: {1: {planar: {K2: 2}}}', ': brushes, 1: planar: K2 is 2; expected a number 0 '),
+        ('brushes: {1: {solids: 0.4}}',
+         ': brushes, 1: planar is missing; calibrate the brush, or'),
+        ('planar: {}\nbrushes: {1: {planar: {}}}',
+         ': planar and brushes are both given; keep one'),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_one_line(file, text: str, message: str):
     assert message in refusal(file('model.yaml', text))
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('brushes: {}', 'brushes is empty; give a brush by its number, or planar'),
-        ('brushes: {0: {planar: {}}}', 'brushes: 0 is not a brush number; give 1, 2 and so on'),
-        ('brushes: {1: 3}', 'brushes, 1 is 3; expected the keys '),
-        ('brushes: {1: {planer: {}}}', "brushes, 1: unknown key 'planer'; did you mean 'planar'?"),
-        ('brushes: {1: {planar: {}, solids: 45}}', 'brushes, 1: solids is 45; expected a number'),
-        ('brushes: {1: {planar: {K2: 2}}}', 'brushes, 1: planar: K2 is 2; expected a number 0 '),
-        ('brushes: {1: {solids: 0.4}}', 'brushes, 1: planar is missing; calibrate the brush, or'),
-        ('planar: {}\nbrushes: {1: {planar: {}}}', 'planar and brushes are both given; keep one'),
-    ],
-)
-def test_what_is_no_brush_is_refused_in_one_line(file, text: str, message: str):
-    path = file('model.yaml', text)
-    assert refusal(path).startswith(f'{path}: {message}')
 
 
 def test_a_missing_or_unreadable_file_is_named(tmp_path: Path):
