@@ -10,7 +10,7 @@ from paint_msgs.srv import SaveFilm
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 
-from nodes.cell import Robot, offline_um, parameters, saved_um, two_passes, write_own_model
+from nodes.cell import offline_um, parameters, saved_um, two_passes, write_own_model
 from nodes.processes import NodeProcess, recorder_process, simulator_process
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_recording
@@ -61,13 +61,11 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
     assert np.abs(live_um - expected_um).max() < 1e-6 * expected_um.max()
 
 
-def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(ros_domain, onlooker, wait_until, tmp_path):
+def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(asked, onlooker, wait_until, tmp_path):
     films = tmp_path / 'films'
     fine = {'max_edge_length_m': 0.004, 'output_directory': films}
     with simulator_process(tmp_path, **fine) as simulator:
-        client = onlooker().create_client(SaveFilm, '/deposition_simulator/save_film')
-        wait_until(client.service_is_ready, what='the service')
-        client.call_async(SaveFilm.Request(name='film'))
+        asked(onlooker(), SaveFilm, '/deposition_simulator/save_film', name='film')
         wait_until(lambda: films.is_dir() and any(films.iterdir()), what='the first file')
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
@@ -86,17 +84,16 @@ def test_ctrl_c_while_a_model_is_prepared_ends_it(ros_domain, call, tmp_path):
         assert simulator.wait() == 0, simulator.err
 
 
-def test_a_stall_loses_nothing(ros_domain, ros_context, spin, wait_until, onlooker, tmp_path):
+def test_a_stall_loses_nothing(robot, wait_until, onlooker, tmp_path):
     """Stopped as by a debugger or a swapping machine, while a recorder goes on beside it."""
-    robot, viewer = Robot(ros_context), onlooker(STATS)
-    spin(robot)
+    source, viewer = robot(), onlooker(STATS)
     with simulator_process(tmp_path, **COARSE) as sim, recorder_process(tmp_path) as recorder:
-        wait_until(lambda: robot.has_subscribers(2), what='both')
-        robot.send(MOTION, slice(0, 300))
+        wait_until(lambda: source.has_subscribers(2), what='both')
+        source.send(MOTION, slice(0, 300))
         wait_until(lambda: viewer.newest(STATS), what='statistics')
         sim.stall()
         # More than a second of the middleware's own patience, less than the queues hold.
-        robot.send(MOTION, slice(300, POSES))
+        source.send(MOTION, slice(300, POSES))
         sim.go_on()
         wait_until(lambda: viewer.newest(STATS).poses_received == POSES, what='all poses painted')
         assert viewer.newest(STATS).poses_rejected == 0

@@ -10,11 +10,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
+import scenes
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.effect_file import load_effect_file
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.diagnosis import closed_forms
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
@@ -63,9 +63,7 @@ def door(tmp_path_factory):
 
 def film_um(experiment, model: pd.DepositionModel) -> np.ndarray:
     """What the gauge shows at the readings."""
-    painted = FilmIntegrator(experiment.measured_points, model, 'double', parallel=False)
-    painted.add(experiment.path)
-    return painted.gauge_um
+    return scenes.painted(experiment.measured_points, experiment.path, model, 'double').gauge_um
 
 
 def factor_at(effect, x: np.ndarray) -> np.ndarray:
@@ -170,15 +168,11 @@ def test_fitted_numbers_have_few_digits_and_give_the_fitted_film(file, fitted):
     assert len(numbers) > 10
     long = [n for n in numbers if len(n.lstrip('-0.').replace('.', '')) > 8]
     assert long == [str(BY_HAND)]
-    experiment = fitted.study.campaign.experiments[1]
-
-    def film_on_vertices_um(model: pd.DepositionModel) -> np.ndarray:
-        surface = experiment.surface
-        integrator = FilmIntegrator(surface.points(), model, 'double', surface)
-        integrator.add(experiment.path)
-        return integrator.gauge_um
-
-    expected, found = map(film_on_vertices_um, (fitted.model, pd.read_model(file)))
+    door = fitted.study.campaign.experiments[1]
+    expected, found = (
+        scenes.painted(door.surface.points(), door.path, model, 'double', door.surface).gauge_um
+        for model in (fitted.model, pd.read_model(file))
+    )
     assert np.abs(found - expected).max() < 1e-6 * expected.max()
 
 

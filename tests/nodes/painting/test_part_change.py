@@ -4,6 +4,7 @@ import json
 import shutil
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -42,15 +43,9 @@ def later(motion: pd.Trajectory) -> pd.Trajectory:
 
 
 @pytest.fixture
-def asked(onlooker, wait_until):
+def asked(onlooker, asked):
     """`asked(**fields)`: the future of the simulator's answer, whoever spins."""
-    client = onlooker().create_client(ChangePart, '/deposition_simulator/change_part')
-
-    def asked(**fields):
-        wait_until(client.service_is_ready)
-        return client.call_async(ChangePart.Request(**fields))
-
-    return asked
+    return partial(asked, onlooker(), ChangePart, '/deposition_simulator/change_part')
 
 
 @pytest.fixture

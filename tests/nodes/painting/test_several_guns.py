@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import paint_deposition as pd
-from nodes.cell import Robot, offline_um, turned, two_passes
+from nodes.cell import offline_um, turned, two_passes
 from paint_deposition.files.motion_files import read_gun_motions
 from paint_deposition.request import MotionOptions
 
@@ -23,16 +23,9 @@ THIN = pd.DepositionModel(planar={'K1_cm3_per_s': 1.0})
 
 
 @pytest.fixture
-def guns(ros_context, spin, wait_until):
+def guns(robot):
     """`guns(node)`: a robot for each of GUNS, heard by the node."""
-
-    def guns(node) -> list[Robot]:
-        robots = [Robot(ros_context, namespace=name) for name in GUNS]
-        spin(*robots)
-        wait_until(lambda: all(r.is_subscribed_by(node) for r in robots), what='discovery')
-        return robots
-
-    return guns
+    return lambda node: [robot(node, namespace=name) for name in GUNS]
 
 
 def test_each_guns_share_is_reported(simulator, guns, painted, onlooker, wait_until):
