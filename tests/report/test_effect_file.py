@@ -3,7 +3,6 @@
 import json
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,6 +26,7 @@ from paint_deposition.report.write import write_film
 from paint_deposition.report.write_inference import effect_entry, write_effect_file
 from paint_deposition.report.write_plans import gauge_turns
 from small_campaign import small_campaign
+from surfaces import sheet
 
 KNOTS, SD = 12, 0.02
 RANGES = {
@@ -119,23 +119,15 @@ def test_names_of_effects_of_the_library_are_not_taken_and_those_of_parts_are_fi
     assert {name: write_inference.file_name(name) for name in names} == names
 
 
-@pytest.fixture
-def painted():
-    """A square metre with a ramp of film, and its statistics."""
-    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], dtype=float)
-    surface = pd.Surface.from_triangles(corners, np.array([[0, 1, 2], [0, 2, 3]]), 0.2)
-    film = 50.0 * surface.vertices_m[:, 0] / 3.0
-    stats = film_statistics(film, surface.vertex_areas_m2, 20.0)
-    return surface, film, stats
-
-
-def test_figures_of_any_kind_are_written_and_an_older_film_stays_unless_told(painted, tmp_path):
+def test_figures_of_any_kind_are_written_and_an_older_film_stays_unless_told(tmp_path):
     """Mesh and table are held against each other where `paint simulate` is tried out."""
-    details, stats = {'poses': np.int64(7), 'rate': math.inf}, painted[-1]
-    *_, figures = write_film(tmp_path / 'new', *painted, details=details)
+    surface = sheet(lambda x, z: 0.0 * x)
+    film = 50.0 * (surface.vertices_m[:, 0] + 0.5) / 3.0
+    stats = film_statistics(film, surface.vertex_areas_m2, 20.0)
+    details = {'poses': np.int64(7), 'rate': math.inf}
+    *_, figures = write_film(tmp_path / 'new', surface, film, stats, details=details)
     content = json.loads(figures.read_text())
     assert (content['mean_um'], content['poses'], content['rate']) == (stats.mean_um, 7, None)
-    surface, film, stats = painted
     csv = write_film(tmp_path, surface, film, stats)[1]
     with pytest.raises(pd.PaintError, match=r'film\.ply is there already'):
         write_film(tmp_path, surface, 2 * film, stats)
@@ -147,23 +139,12 @@ def test_figures_of_any_kind_are_written_and_an_older_film_stays_unless_told(pai
 BY_HAND = 0.3012345678901234
 
 
-@pytest.fixture(scope='module')
-def fitted(tmp_path_factory):
-    campaign = small_campaign(tmp_path_factory.mktemp('campaign'))
-    start = pd.DepositionModel(projection=Projection(model_plane_m=BY_HAND))
-    return refit(campaign, start, AirDrift)
-
-
-@pytest.fixture(scope='module')
-def file(tmp_path_factory, fitted) -> Path:
-    path = tmp_path_factory.mktemp('model') / 'model.yaml'
-    known = fitted.posterior, estimates(fitted.history[-1].fit)
-    write_inference.write_fitted(path, fitted.study, fitted.history, *known)
-    return path
-
-
 @pytest.mark.slow
-def test_fitted_numbers_have_few_digits_and_give_the_fitted_film(file, fitted):
+def test_fitted_numbers_have_few_digits_and_give_the_fitted_film(tmp_path):
+    start = pd.DepositionModel(projection=Projection(model_plane_m=BY_HAND))
+    fitted = refit(small_campaign(tmp_path), start, AirDrift)
+    file, known = tmp_path / 'model.yaml', (fitted.posterior, estimates(fitted.history[-1].fit))
+    write_inference.write_fitted(file, fitted.study, fitted.history, *known)
     numbers = re.findall(r': (-?[\d.]+)(?:e[+-]?\d+)?\b', file.read_text())
     assert len(numbers) > 10
     long = [n for n in numbers if len(n.lstrip('-0.').replace('.', '')) > 8]

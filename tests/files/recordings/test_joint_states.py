@@ -169,10 +169,9 @@ def test_joints_and_transforms_that_start_again_are_refused_and_named(tmp_path):
         assert np.allclose(read.positions_m, tip_poses(sweep())[0], atol=1e-9)
 
 
-IO = 'cell_msgs/msg/Io'
 TYPES = {
     'cell_msgs/msg/Valve': 'bool open\nfloat64 pressure_bar\nstring label\n',
-    IO: 'int32[] states\nfloat64 level\nuint8 word\ncell_msgs/Valve[2] valves\n',
+    'cell_msgs/msg/Io': 'int32[] states\nfloat64 level\nuint8 word\ncell_msgs/Valve[2] valves\n',
     'cell_msgs/msg/Stamped': 'std_msgs/Header header\nint16 brush\n',
 }
 PASS = straight_pass(triggers=False)
@@ -182,28 +181,19 @@ ON[10:40] = True
 
 
 @pytest.fixture(scope='module')
-def messages():
-    return Messages(state_types=TYPES)
-
-
-def io_message(messages, on: bool):
+def bag(tmp_path_factory):
+    """The pass, and the cell's signals at every pose, logged as the pose is stamped."""
+    messages, entries = Messages(state_types=TYPES), pose_entries(PASS)
     types = messages.store.types
     valve = types['cell_msgs/msg/Valve']
-    return types[IO](
-        np.array([7, 0, 3, 5 if on else 0], np.int32), 23.8 if on else 0.4, 1 if on else 0,
-        [valve(False, 0.0, 'off'), valve(on, 3.1 if on else np.nan, 'needle')],
-    )  # fmt: skip
-
-
-@pytest.fixture(scope='module')
-def bag(messages, tmp_path_factory):
-    """The pass, and the cell's signals at every pose, logged as the pose is stamped."""
-    types = messages.store.types
-    entries = pose_entries(PASS)
     for stamp, on in zip(PASS.stamps_ns.tolist(), ON.tolist(), strict=True):
+        io = types['cell_msgs/msg/Io'](
+            np.array([7, 0, 3, 5 if on else 0], np.int32), 23.8 if on else 0.4, 1 if on else 0,
+            [valve(False, 0.0, 'off'), valve(on, 3.1 if on else np.nan, 'needle')],
+        )  # fmt: skip
         brush = types['cell_msgs/msg/Stamped'](messages.header(stamp), 2 if on else 0)
         entries += [
-            ('/io', stamp, io_message(messages, on)),
+            ('/io', stamp, io),
             ('/brush', stamp + 7_000_000_000, brush),
             ('/valve/pressure', stamp, types['std_msgs/msg/Float64'](3.0 if on else 0.0)),
             ('/closed', stamp, types['std_msgs/msg/Int32'](0 if on else 1)),
@@ -211,12 +201,6 @@ def bag(messages, tmp_path_factory):
         ]
     folder = tmp_path_factory.mktemp('cell') / 'run'
     return write_bag(folder, entries, 'sqlite3', messages)
-
-
-def openings(trajectory) -> np.ndarray:
-    """The flow at each pose."""
-    rows = np.searchsorted(trajectory.trigger_stamps_ns, PASS.stamps_ns, side='right') - 1
-    return trajectory.trigger_flow[rows] > 0.0
 
 
 @pytest.mark.parametrize(
@@ -232,7 +216,8 @@ def openings(trajectory) -> np.ndarray:
 )
 def test_a_number_in_any_field_opens_the_gun(trigger, said, bag):
     read = read_recording(bag, None, trigger)
-    assert np.array_equal(openings(read), ON)
+    rows = np.searchsorted(read.trigger_stamps_ns, PASS.stamps_ns, side='right') - 1
+    assert np.array_equal(read.trigger_flow[rows] > 0.0, ON)
     (note,) = read.notes
     assert said in note
 
@@ -272,22 +257,17 @@ def tf_bag(path, storage='mcap'):
     return write_bag(path, entries, storage, messages)
 
 
-def expected_poses():
-    """Of the bell in the world."""
+def test_the_bell_in_the_world_is_the_product_along_the_tree(tmp_path):
+    bag = tf_bag(tmp_path / 'run.bag', 'ros1')
+    read = read_recording(bag, tf=['world', 'bell'], frame_id='world')
     positions, quaternions = tip_poses(sweep())
     bell, turn = Rigid.of(BELL), Rotation.from_quat(quaternions)
     at = positions + turn.apply(bell.translation_m) + [0, 0, 0.1]
     at[:, 0] += 0.1 * TIMES_S
-    return at, (turn * Rotation.from_quat(bell.quaternion_xyzw)).as_quat()
-
-
-def test_the_bell_in_the_world_is_the_product_along_the_tree(tmp_path):
-    bag = tf_bag(tmp_path / 'run.bag', 'ros1')
-    read = read_recording(bag, tf=['world', 'bell'], frame_id='world')
-    positions, quaternions = expected_poses()
     assert np.array_equal(read.stamps_ns, stamps_ns(TIMES_S))
-    assert np.allclose(read.positions_m, positions, atol=1e-6)
-    apart = Rotation.from_quat(quaternions).inv() * Rotation.from_quat(read.quaternions_xyzw)
+    assert np.allclose(read.positions_m, at, atol=1e-6)
+    turned = turn * Rotation.from_quat(bell.quaternion_xyzw)
+    apart = turned.inv() * Rotation.from_quat(read.quaternions_xyzw)
     assert apart.magnitude().max() < 1e-6
     (note,) = read.notes
     assert "pose of 'bell' in 'world', 151 poses" in note
