@@ -20,7 +20,6 @@ PANEL = f'simulate --mesh panel.stl --trajectory panel_577 {COARSE}'
 DOOR = f'--mesh door.stl --trajectory door_horizontal {COARSE}'
 GUNS = f'{PANEL} --trajectory panel_577'
 IMPROVE = f'improve {DOOR} --state-topic /atomizer/state'
-MEASURE = f'measure --mesh door.stl {COARSE}'
 PLAN = 'plan --mesh door.stl --speed 0.3'
 CAMPAIGN = 'measured_door/campaign.yaml'
 NO_WINDOW = pytest.mark.skipif(find_spec('rerun') is not None, reason='Rerun opens a window')
@@ -83,7 +82,7 @@ def jobs(tmp_path_factory):
     (f'{IMPROVE} --flow 0 1', '--flow|0.0'), (f'{IMPROVE} --acceleration fast', 'fast'),
     (f'{IMPROVE} --joint-acceleration 2', '--joint-acceleration goes with a robot; give --urdf'),
     (f'{IMPROVE} --urdf robot.urdf', '--urdf needs --part-pose'),
-    (MEASURE, '--trajectory|--target-um'),
+    (f'measure --mesh door.stl {COARSE}', '--trajectory|--target-um'),
     (f'measure {DOOR} --target-um 20', 'leave one of them out'),
     (f'measure {DOOR} --brush 2', 'leave one of them out'),
     ('diagnose nowhere.yaml', 'nowhere.yaml: no such file|give a campaign YAML'),

@@ -2,7 +2,6 @@
 
 import socket
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.transforms import Rigid
+from paint_deposition.motion.transforms import Rigid, moved
 from paint_deposition.nodes.topics import (
     CLOCK,
     LATCHED,
@@ -122,10 +121,8 @@ def two_passes(poses: int = TWO_PASSES_POSES, trigger: bool = True) -> Trajector
 
 def turned(motion: Trajectory, degrees: float) -> Trajectory:
     """The motion turned about the vertical z."""
-    turn = Rotation.from_euler('z', degrees, degrees=True)
-    quaternions = (turn * Rotation.from_quat(motion.quaternions_xyzw)).as_quat()
-    places = turn.apply(motion.positions_m)
-    return replace(motion, positions_m=places, quaternions_xyzw=quaternions)
+    turn = Rotation.from_euler('z', degrees, degrees=True).as_quat()
+    return moved(motion, Rigid.of([0.0, 0.0, 0.0, *turn]), motion.frame_id)
 
 
 def offline_um(

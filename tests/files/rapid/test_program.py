@@ -1,11 +1,13 @@
 """RAPID programs: what they are made of, their motion, and what cannot be followed."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import refusals
 from paint_deposition.errors import PlanError, RecordingError
 from paint_deposition.files.rapid import program as rapid
 from paint_deposition.files.rapid.program import module_text, read_program
@@ -33,12 +35,7 @@ def read(tmp_path):
     return read
 
 
-def refusal(read, *arguments, **options) -> str:
-    with pytest.raises(RecordingError) as refused:
-        read(*arguments, **options)
-    text = str(refused.value)
-    assert '\n' not in text
-    return text
+refusal = partial(refusals.refusal, RecordingError)
 
 
 def test_declared_targets_speeds_and_zones(read):

@@ -5,11 +5,13 @@ import shutil
 import sqlite3
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 import paint_deposition as pd
+import refusals
 from files.recorded import POSE, START_NS, Messages, pose_entries, straight_pass, write_bag
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
@@ -27,12 +29,7 @@ def same(read: pd.Trajectory, written: pd.Trajectory) -> bool:
     )
 
 
-def refusal(*arguments) -> str:
-    with pytest.raises(RecordingError) as refused:
-        pd.read_recording(*arguments)
-    text = str(refused.value)
-    assert '\n' not in text
-    return text
+refusal = partial(refusals.refusal, RecordingError, pd.read_recording)
 
 
 @pytest.mark.parametrize('storage', ['ros1', 'sqlite3', 'mcap'])

@@ -182,18 +182,6 @@ def ticks(viewer) -> list[int]:
     return [Time.from_msg(message.clock).nanoseconds for message in viewer.all('/clock')]
 
 
-@pytest.fixture
-def watch(onlooker, wait_until):
-    """`watch()`: who has heard the clock."""
-
-    def watch():
-        viewer = onlooker('/clock')
-        wait_until(lambda: len(viewer.heard['/clock']) > 5, what='the clock')
-        return viewer
-
-    return watch
-
-
 def test_the_clock_runs_on_through_a_gap(play, listen, onlooker, wait_until, tmp_path):
     written = straight_pass(60, triggers=False)
     stamps_ns = written.stamps_ns.copy()
@@ -212,8 +200,14 @@ def test_the_clock_runs_on_through_a_gap(play, listen, onlooker, wait_until, tmp
 
 
 @pytest.mark.parametrize('rate', [1.0, 0.0])
-def test_the_clock_stands_meanwhile(play, listen, watch, call, wait_until, pass_bag, rate):
+def test_the_clock_stands_meanwhile(play, listen, onlooker, call, wait_until, pass_bag, rate):
     """Before the start and while paused, also for who comes late; it runs with the first pose."""
+
+    def watch():
+        viewer = onlooker('/clock')
+        wait_until(lambda: len(viewer.heard['/clock']) > 5, what='the clock')
+        return viewer
+
     player = play(pass_bag, rate=rate, window=50)
     viewer = watch()
     tell = partial(call, viewer, Trigger)

@@ -11,6 +11,7 @@ from brushes import switched, two_brushes
 from nodes.cell import offline_um, parameters, two_passes, write_own_model
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.errors import ModelError
+from refusals import refusal
 
 MOTION = two_passes()
 # One effect that acts on each ray, and one that needs whole strokes.
@@ -94,10 +95,8 @@ def test_a_model_that_a_peer_sets_runs_and_reads_no_file(simulator, tmp_path, tm
     """Files elsewhere are not opened, and a message holds nothing of those that are no models."""
     own = write_own_model(tmp_path)
     (tmp_path / 'own.py').write_text('raise SystemExit("run without leave")')
-    with pytest.raises(ModelError) as refused:
-        simulator(model_file=str(own))
-    refusal = str(refused.value)
-    assert refusal == (
+    refused = refusal(ModelError, simulator, model_file=str(own))
+    assert refused == (
         f'{own}: effect file {tmp_path}/own.py is not run, because it is Python code; if you '
         'trust it, start the node with allow_user_effects:=true'
     )
@@ -106,7 +105,7 @@ def test_a_model_that_a_peer_sets_runs_and_reads_no_file(simulator, tmp_path, tm
     def told(**values) -> str:
         return node.set_parameters_atomically(parameters(**values)).reason
 
-    assert told(model_file=str(own)) == refusal
+    assert told(model_file=str(own)) == refused
     # Nobody who can set parameters can give leave.
     assert told(allow_user_effects=True, model_file=str(own))
     assert not node.get_parameter('allow_user_effects').value
