@@ -63,14 +63,14 @@ def lying_plane(half_m: float = 0.6, count: int = 41) -> SurfacePoints:
 
 def painted(
     points: SurfacePoints, motion: Trajectory | SprayPath, model=None, precision='single',
-    occluder: Surface | None = None,
+    occluder: Surface | None = None, **options,
 ) -> FilmIntegrator:  # fmt: skip
     """The integrator after a motion, cut into sub-steps as the model asks, or a path."""
     model = model or DepositionModel()
     path = motion
     if isinstance(motion, Trajectory):
         path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
-    integrator = FilmIntegrator(points, model, precision, occluder)
+    integrator = FilmIntegrator(points, model, precision, occluder, **options)
     integrator.add(path)
     return integrator
 

@@ -105,12 +105,18 @@ def jobs(tmp_path_factory):
     ('inspect poses.csv --tool-axis x', '--tool-axis: not for a table of poses; leave it'),
     ('inspect door_horizontal --gun-signal doGun', '--gun-signal is for RAPID modules'),
     ('locate --touched readings.csv', "Missing option '--points'"),
+    ('place --trajectory door_horizontal --urdf robot.urdf', '--part-pose'),
+    ('watch', 'give RUN, or --live'), ('watch --live', 'give --mesh'),
+    ('watch --live --mesh door.stl --rate 4', '--rate is for a recorded RUN'),
+    ('watch nowhere', 'is not there; give a recorded run'),
+    ('watch . --port 0', 'does not name the mesh'),
+    ('watch nowhere --tolerance-um 2', 'no --target-um'),
     pytest.param('view .', 'no .mcap file', marks=NO_WINDOW),
     pytest.param('view door_horizontal', 'pip install rerun-sdk', marks=NO_WINDOW),
 ])  # fmt: skip
 def test_what_a_command_cannot_do_is_one_line_and_nothing_is_written(words, told, jobs, tmp_path):
     command, *rest = shlex.split(words)
-    output = () if command in ('inspect', 'locate', 'view') else ('-o', tmp_path / 'out')
+    output = () if command in ('inspect', 'locate', 'view', 'watch') else ('-o', tmp_path / 'out')
     assert_refused(paint(command, *rest, *output, cwd=jobs), *told.split('|'))
     assert not list(tmp_path.iterdir())
 

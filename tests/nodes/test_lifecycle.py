@@ -11,12 +11,9 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from paint_msgs.srv import SaveFilm
 
-from booth import SAMPLES
 from nodes.cell import offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.managed_node import ManagedNode
-from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
 MOTION = two_passes()
 EVENTS = '/deposition_simulator/transition_event'
@@ -189,12 +186,9 @@ def test_each_activation_is_a_whole_run(record, robot, manager, wait_until, tmp_
     assert managed('shutdown') == (True, 'finalized')
 
 
-@pytest.mark.parametrize('node_class', [DepositionSimulator, RunRecorder])
-def test_repeated_cycles_leave_nothing_behind(start, manager, tmp_path, node_class):
-    panel = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
-    values = {'autostart': False, 'output_directory': str(tmp_path)}
-    values |= panel if node_class is DepositionSimulator else {}
-    node = start(node_class, **values)
+@pytest.mark.parametrize('kind', ['simulator', 'record'])
+def test_repeated_cycles_leave_nothing_behind(request, manager, kind):
+    node = request.getfixturevalue(kind)(autostart=False)
     managed = manager(node)
 
     def entities() -> list[int]:

@@ -138,10 +138,9 @@ def test_default_range_follows_the_width_of_the_pattern(scale):
     assert recommended().index_range_m == (0.2, 0.8)
 
 
-ENDS = [(0.35, 0.45, {}), (0.45, 0.55, {}), (0.29, 0.5, {'tolerance': 0.06})]
-
-
-@pytest.mark.parametrize(('low', 'high', 'what'), ENDS)
+@pytest.mark.parametrize(('low', 'high', 'what'), [
+    (0.35, 0.45, {}), (0.45, 0.55, {}), (0.29, 0.5, {'tolerance': 0.06}),
+])  # fmt: skip
 def test_without_a_minimum_the_more_even_end_is_recommended(low, high, what):
     answer = recommended(index_min_m=low, index_max_m=high, **what)
     ends = answer.windows_m[0] if 'tolerance' in what else answer.index_range_m

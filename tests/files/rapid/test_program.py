@@ -14,11 +14,9 @@ from paint_deposition.files.rapid.program import module_text, read_program
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import GunSwitch, Move
 
-AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
-
 
 def target(x, y=0.0, z=0.0, wxyz='1,0,0,0') -> str:
-    return f'[[{x},{y},{z}],[{wxyz}],{AXES}]'
+    return f'[[{x},{y},{z}],[{wxyz}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]'
 
 
 @pytest.fixture

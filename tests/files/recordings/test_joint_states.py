@@ -137,12 +137,6 @@ def test_joint_states_that_are_not_used_are_counted(tmp_path):
     }
 
 
-def logged_twice(messages, topic):
-    """Messages of 3 s, (stamp, message), as from a log that is played in a loop."""
-    both = [message for _, message in messages] * 2
-    return [(topic, 20_000_000 * row, message) for row, message in enumerate(both, start=1)]
-
-
 def test_joints_and_transforms_that_start_again_are_refused_and_named(tmp_path):
     """A single one that comes late by more than a second is none of another stream."""
     made, again = Messages(), 'the stamps start again 3.020 s after its first message; cut the bag'
@@ -155,7 +149,10 @@ def test_joints_and_transforms_that_start_again_are_refused_and_named(tmp_path):
         ('/joint_states', joints, {'urdf': str(URDF)}),
         ('/tf', transforms, {'tf': ['world', 'tool0']}),
     ):
-        folder = write_bag(tmp_path / f'{topic[1:]}_twice', logged_twice(messages, topic))
+        # As from a log that is played in a loop.
+        both = [message for _, message in messages] * 2
+        entries = [(topic, 20_000_000 * row, message) for row, message in enumerate(both, start=1)]
+        folder = write_bag(tmp_path / f'{topic[1:]}_twice', entries)
         assert again in refusal(RecordingError, read_recording, folder, **options)
         with open_bag(folder) as bag:
             (source,) = sources_of_poses(bag, 0.25)
@@ -238,7 +235,6 @@ def test_the_run_of_a_part_keeps_the_order_in_which_its_states_came(tmp_path):
 
 
 BELL = [0.0, 0.02, 0.31, *Rotation.from_euler('y', 0.3).as_quat()]
-RAIL = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]
 
 
 def tf_bag(path, storage='mcap'):
@@ -249,7 +245,7 @@ def tf_bag(path, storage='mcap'):
     entries = [('/tf_static', stamps[0], messages.transforms((0, 'tool0', 'bell', BELL)))]
     for row, stamp in enumerate(stamps.tolist()):
         pose = (stamp, 'rail', '/tool0', [*positions[row], *quaternions[row]])
-        rail = (stamp, 'world', 'rail', [0.1 * TIMES_S[row], *RAIL[1:]])
+        rail = (stamp, 'world', 'rail', [0.1 * TIMES_S[row], 0, 0.1, 0, 0, 0, 1])
         rows = [pose, rail] if row % 10 == 0 else [pose]
         entries.append(('/tf', stamp, messages.transforms(*rows)))
     return write_bag(path, entries, storage, messages)

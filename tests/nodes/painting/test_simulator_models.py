@@ -18,7 +18,6 @@ MOTION = two_passes()
 MODEL = pd.DepositionModel(
     effects=tuple(effect_class(i).typical() for i in ('incidence_attraction', 'corner_slowdown'))
 )
-THIN = pd.DepositionModel(planar={'K1_cm3_per_s': 0.19})
 BRUSHES = two_brushes()
 POSES = 'deposition_simulator: poses'
 
@@ -130,7 +129,7 @@ def test_a_new_model_may_also_paint_from_then_on_only(simulated, painted, wait_u
     node, source = simulated(repaint=False)
     source.send(MOTION, slice(0, 300))
     before = painted(node, 300)
-    set_model(node, THIN)
+    set_model(node, pd.DepositionModel(planar={'K1_cm3_per_s': 0.19}))
     wait_until(lambda: not node.repainting)
     source.send(MOTION, slice(300, None))
     whole = offline_um(node, MOTION)
