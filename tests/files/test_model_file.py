@@ -213,8 +213,6 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path):
 
 CORNERS = DepositionModel(effects=(EFFECTS['corner_slowdown'](gain=0.5, length_m=0.2),))
 NAMES = [*(c.name for c in PATTERN), 'corner_slowdown.gain', 'corner_slowdown.log_length_m']
-
-
 ROOT = np.random.default_rng(0).normal(size=(len(NAMES), len(NAMES)))
 COVARIANCE = 1e-4 * ROOT @ ROOT.T
 POSTERIOR = Posterior(

@@ -22,8 +22,6 @@ TURNS = Rotation.from_euler(
 )
 ON = [0, 1, 1, 0, 0]
 HEAD = 't,x,y,z,qx,qy,qz,qw'
-
-
 # What must be said to read a file of `poses/`, each of which has the motion in another layout.
 LAYOUTS = Path(__file__).with_name('poses')
 SAID = {
