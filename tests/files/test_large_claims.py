@@ -145,7 +145,7 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
         'rapid', lambda: RAPID.replace(b'[[0,0,0]', b'[' * 20_000 + b'[0,0,0]'),
     ),
     'links of a URDF': ('urdf', lambda: b'<robot name="a">' + b'<link name="x">' * 20_000),
-    'an array of RAPID': ('rapid', lambda: RAPID.replace(b'n{2}:=', b'n{1000000000}:=[[')),
+    'an array of RAPID': ('rapid', lambda: RAPID.replace(b'p1:=', b'p1{1000000000}:=[[')),
 }  # fmt: skip
 
 

@@ -156,7 +156,8 @@ REFUSED = {
     ],
     'run_recorder': [
         ({'mesh_file': '/nowhere.stl'}, 'mesh_file /nowhere.stl: No such file or directory'),
-        ({'output_directory': '/dev/null', 'name': 'run'}, 'cannot create /dev/null/run'),
+        ({'output_directory': '/dev/null/runs', 'name': 'run'},
+         'cannot create /dev/null/runs/run'),
     ],
     'rws_source': [
         ({}, 'trigger is empty'),
