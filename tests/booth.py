@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
+import scenes
 from paint_deposition.effects.base import Effect
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -108,9 +109,7 @@ def painted(
     path = motion if isinstance(motion, SprayPath) else path_of(motion)
     model = model.model_copy(update={'effects': effects})
     # By one thread, as readings are predicted: that is compiled once, in a third of the time.
-    integrator = FilmIntegrator(surface.points(), model, precision, surface, parallel=False)
-    integrator.add(path)
-    return integrator
+    return scenes.painted(surface.points(), path, model, precision, surface, parallel=False)
 
 
 def volume_cm3(film_um: np.ndarray, points: SurfacePoints) -> float:

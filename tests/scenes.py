@@ -10,6 +10,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
 
 START_NS = 1_760_000_000_000_000_000
 # Tool z along -z of the world, tool x along its x: the gun looks down on a lying plane.
@@ -61,14 +62,15 @@ def lying_plane(half_m: float = 0.6, count: int = 41) -> SurfacePoints:
 
 
 def painted(
-    points: SurfacePoints, motion: Trajectory | SprayPath, model=None, precision='single'
-) -> FilmIntegrator:
+    points: SurfacePoints, motion: Trajectory | SprayPath, model=None, precision='single',
+    occluder: Surface | None = None, **options,
+) -> FilmIntegrator:  # fmt: skip
     """The integrator after a motion, cut into sub-steps as the model asks, or a path."""
     model = model or DepositionModel()
     path = motion
     if isinstance(motion, Trajectory):
         path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
-    integrator = FilmIntegrator(points, model, precision)
+    integrator = FilmIntegrator(points, model, precision, occluder, **options)
     integrator.add(path)
     return integrator
 

@@ -19,7 +19,6 @@ MODULE P
   ENDPROC
 ENDMODULE
 """
-DIGEST = 64 * '0'
 
 
 @pytest.fixture
@@ -32,7 +31,7 @@ def ran(tmp_path):
 
 
 def module(folder):
-    (folder / 'passes.mod').write_text(RAPID.format(DIGEST))
+    (folder / 'passes.mod').write_text(RAPID.format(64 * '0'))
     return ('simulate', '--mesh', PANEL, '--trajectory', folder / 'passes.mod')
 
 

@@ -4,7 +4,6 @@ import ast
 import inspect
 import io
 import json
-import math
 import os
 import shlex
 import subprocess
@@ -12,20 +11,18 @@ import sys
 from contextlib import redirect_stderr
 from importlib import metadata
 from pathlib import Path
-from typing import Literal
 
 import click
 import pytest
-from click.testing import CliRunner
 
+import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.cli import results, samples
 from paint_deposition.cli.main import COMMANDS
 from paint_deposition.cli.main import paint as group
-from paint_deposition.cli.options import options_of
 from paint_deposition.cli.results import progress
-from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request, given, takes
+from paint_deposition.request import FilmBand, MotionOptions, OnePart
 from waiting import until
 
 
@@ -153,51 +150,15 @@ def test_the_clock_runs_within_a_step_and_a_known_share_is_a_bar():
     assert pipe.getvalue() == ''
 
 
-class Coat(Request):
-    speed_m_per_s: float = given(0.3, 'Of the passes [m/s].', '--speed', above=0.0, most=3.0)
-    passes: int | None = given(None, 'How many.', least=1)
-    lean_rad: float = given(0.0, 'Of the gun.', least=-math.pi / 4, most=math.pi / 4)
-    outward: tuple[float, float, float] | None = given(None, 'To the gun.', metavar='X Y Z')
-    direction: Literal['level', 'upright'] = given('level', 'Of the passes.')
-    one_way: bool = given(False, 'All passes in one direction.')
-
-
-@click.command()
-@options_of(Coat, into='coat')
-def command(coat):
-    click.echo(repr(coat))
-
-
-def sprayed(*words):
-    return CliRunner().invoke(command, [str(word) for word in words])
-
-
-def test_each_field_is_an_option_and_the_command_gets_the_request():
-    words = ('--speed', 0.5, '--passes', 3, '--lean-deg', 30, '--outward', 0, -1, 0)
-    done = sprayed(*words, '--direction', 'upright', '--one-way')
-    expected = Coat(
-        speed_m_per_s=0.5, passes=3, lean_rad=math.radians(30), outward=(0, -1, 0),
-        direction='upright', one_way=True,
-    )  # fmt: skip
-    assert done.output.strip() == repr(expected)
-    assert sprayed().output.strip() == repr(Coat())
-
-
-def test_help_shows_text_default_and_bounds():
-    text = ' '.join(sprayed('--help').output.split())
-    assert '--speed FLOAT RANGE Of the passes [m/s]. [default: 0.3; 0.0<x<=3.0]' in text
+def test_help_and_the_verb_show_the_fields_of_a_request():
+    text = ' '.join(paint('plan', '--help').stdout.split())
+    assert '--speed FLOAT RANGE Speed of the passes [m/s]. [0.005<=x<=3.0]' in text
+    assert 'Least speed while spraying [m/s]. [default: 0.1; x>0.0]' in text
     assert '--outward X Y Z' in text
-    assert '--direction [level|upright]' in text
-
-
-def test_a_verb_shows_the_fields_of_its_request():
-    @takes(Coat)
-    def spray(model, *, frame_id='part', **wanted):
-        return Coat(**wanted)
-
-    shown = inspect.signature(spray).parameters
-    assert list(shown)[:3] == ['model', 'frame_id', 'speed_m_per_s']
-    assert shown['speed_m_per_s'].default == 0.3
+    assert '--direction [horizontal|vertical]' in text
+    shown = inspect.signature(pd.plan).parameters
+    assert list(shown)[:3] == ['surface', 'model', 'frame_id']
+    assert shown['direction'].default == 'horizontal'
 
 
 @pytest.mark.parametrize('kind', [MotionOptions, OnePart, FilmBand])

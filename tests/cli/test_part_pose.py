@@ -11,7 +11,7 @@ import paint_deposition as pd
 from cli.command import COARSE, assert_refused, figures_of, film_in, level_pass, paint, ran
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.motion.transforms import Rigid
+from paint_deposition.motion.transforms import Rigid, moved
 
 # The part stands two metres before the robot, turned and leaning.
 PART_POSE = [2.1, -0.4, 0.9, *Rotation.from_euler('ZYX', [1.9, 0.3, -0.2]).as_quat().tolist()]
@@ -21,9 +21,7 @@ POINTS = {'A': [0, 0, 0], 'B': [900, 0, 10], 'C': [850, 40, 600], 'D': [30, 0, 5
 
 def seen_from_the_robot(frame_id: str = 'base_link') -> pd.Trajectory:
     """The same pass as the robot tells it."""
-    at_part = level_pass(frame_id=frame_id)
-    poses = Rigid.of(PART_POSE).applied(at_part.positions_m, at_part.quaternions_xyzw)
-    return pd.Trajectory(at_part.stamps_ns, *poses, frame_id)
+    return moved(level_pass(), Rigid.of(PART_POSE), frame_id)
 
 
 def brought_to_the_part(path, **options) -> pd.Trajectory:

@@ -85,7 +85,7 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     folder = tmp_path / 'plan'
     done = ran(
         'plan', '--mesh', SAMPLES / 'door.stl', '--model', model_file, '--target-um', 20,
-        '--speed-max', 0.1, '-o', folder, '--json', '--paint-moves',
+        '--speed-max', 0.1, '-o', folder, '--json', '--paint-moves', '--direction', 'vertical',
     )  # fmt: skip
     content = json.loads(done.stdout)
     assert content == told_in(folder / 'plan.json')
@@ -99,7 +99,9 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     }  # fmt: skip
     program = read_program(folder / 'passes.mod')
     assert {'paintl', 'movel'} <= {move.instruction for move in program.moves}
-    assert len(pd.read_recording(folder / 'trajectory')) > 1000
+    motion = pd.read_recording(folder / 'trajectory')
+    assert len(motion) > 1000
+    assert np.ptp(motion.positions_m[: len(motion) // 20, 2]) > 0.5
     assert is_picture(folder / 'film.png')
 
 

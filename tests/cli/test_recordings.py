@@ -131,13 +131,10 @@ def test_inspect_a_real_program(shared_data):
     assert content['moves'][0]['position_m'] == [0.61391, 2.32615, 1.04068]
 
 
-def test_provenance_names_each_file_with_its_digest():
+def test_provenance_names_each_file_with_a_digest_of_content_and_names(tmp_path):
     bag = SAMPLES / 'door_horizontal'
     (file,) = figures_of('inspect', bag, '--json')['provenance']['files']
     assert file == {'what': 'recording', 'file': str(bag), 'sha256': sha256(bag)}
-
-
-def test_a_digest_changes_with_content_and_with_names(tmp_path):
     (tmp_path / 'a').write_text('film')
     first = sha256(tmp_path)
     (tmp_path / 'a').rename(tmp_path / 'b')

@@ -1,6 +1,7 @@
 """The integral: what it does not depend on, its terms, and shadows on it."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -25,8 +26,7 @@ from scenes import lying_plane, stamps_ns, straight_pass, weaving
 MODEL = pd.DepositionModel()
 
 
-def painted(points, motion, model=MODEL, precision='double'):
-    return scenes.painted(points, motion, model, precision)
+painted = partial(scenes.painted, precision='double')
 
 
 def largest_error(film, expected):
@@ -264,6 +264,5 @@ def test_a_prepared_path_serves_a_wider_pattern(tray, path):
     steps = prepared.steps(path)
     prepared.use(wide)
     prepared.paint(steps)
-    film = FilmIntegrator(tray.points(), wide, 'double', tray)
-    film.add(path)
+    film = painted(tray.points(), path, wide, occluder=tray)
     assert np.abs(prepared.film_um - film.film_um).max() < 1e-5 * film.film_um.max()

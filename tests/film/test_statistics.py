@@ -87,8 +87,6 @@ def test_zones_share_the_area_and_add_up_to_the_whole():
 
 ONE = Brush(number=1, planar=NARROW, flow_cm3_per_min=180.0, solids=0.5, density_g_per_cm3=1.2)
 TWO = Brush(number=2, planar=WIDE, flow_cm3_per_min=360.0, solids=0.5, density_g_per_cm3=1.1)
-
-
 # One second of brush 1 at flow 0.5, two of brush 2.
 MOTION = straight_pass(
     np.arange(0.0, 4.0, 0.02), (-0.2, 0.0, 0.25), (0.2, 0.0, 0.25),

@@ -2,7 +2,6 @@
 
 import socket
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,10 +22,8 @@ from sensor_msgs.msg import JointState, PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.transforms import Rigid
+from paint_deposition.motion.transforms import Rigid, moved
 from paint_deposition.nodes.topics import (
     CLOCK,
     LATCHED,
@@ -36,8 +33,8 @@ from paint_deposition.nodes.topics import (
     header,
     pose_message,
 )
+from scenes import START_NS, painted
 
-START_NS = 1_760_000_000_000_000_000
 # The tool's z axis along +y, toward a panel that looks to -y.
 FACING_PANEL = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 PANEL_M = 0.8
@@ -124,23 +121,15 @@ def two_passes(poses: int = TWO_PASSES_POSES, trigger: bool = True) -> Trajector
 
 def turned(motion: Trajectory, degrees: float) -> Trajectory:
     """The motion turned about the vertical z."""
-    turn = Rotation.from_euler('z', degrees, degrees=True)
-    quaternions = (turn * Rotation.from_quat(motion.quaternions_xyzw)).as_quat()
-    places = turn.apply(motion.positions_m)
-    return replace(motion, positions_m=places, quaternions_xyzw=quaternions)
+    turn = Rotation.from_euler('z', degrees, degrees=True).as_quat()
+    return moved(motion, Rigid.of([0.0, 0.0, 0.0, *turn]), motion.frame_id)
 
 
 def offline_um(
     node, trajectory: Trajectory, model: DepositionModel | None = None, precision: str = 'single'
 ) -> np.ndarray:
     """The film that an offline run has at the node's points."""
-    model = model or DepositionModel()
-    path, _ = spray_path(
-        trajectory, max_step_m=model.max_step_m, whole_strokes=model.needs_whole_strokes
-    )
-    integrator = FilmIntegrator(node.points, model, precision, node.surface)
-    integrator.add(path)
-    return integrator.film_um
+    return painted(node.points, trajectory, model, precision, node.surface).film_um
 
 
 def free_port(kind: int = socket.SOCK_DGRAM) -> int:

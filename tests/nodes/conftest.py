@@ -81,11 +81,11 @@ def still(wait_until):
 
 @pytest.fixture
 def robot(ros_context, spin, wait_until):
-    """`robot(*nodes)`: a robot that these nodes hear."""
+    """`robot(*nodes, **options)`: a robot that runs, and that these nodes hear."""
     from nodes.cell import Robot
 
-    def robot(*nodes) -> Robot:
-        robot = Robot(ros_context)
+    def robot(*nodes, **options) -> Robot:
+        robot = Robot(ros_context, **options)
         spin(robot)
         wait_until(lambda: robot.is_subscribed_by(*nodes), what='discovery of the simulator')
         return robot
@@ -118,16 +118,26 @@ def onlooker(ros_context, spin):
 
 
 @pytest.fixture
-def call(wait_until):
-    """`call(node, type, name, **fields)`: the response of a service, found once."""
+def asked(wait_until):
+    """`asked(node, type, name, **fields)`: the future of the response of a service, found once."""
     clients = {}
 
-    def call(node, service, name, /, **fields):
+    def asked(node, service, name, /, **fields):
         if (node, name) not in clients:
             clients[node, name] = node.create_client(service, name)
         client = clients[node, name]
         wait_until(client.service_is_ready, what=f'service {name}')
-        future = client.call_async(service.Request(**fields))
+        return client.call_async(service.Request(**fields))
+
+    return asked
+
+
+@pytest.fixture
+def call(asked, wait_until):
+    """`call(node, type, name, **fields)`: the response of a service."""
+
+    def call(node, service, name, /, **fields):
+        future = asked(node, service, name, **fields)
         wait_until(future.done, what=f'answer of {name}')
         return future.result()
 

@@ -14,9 +14,7 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, UInt16
 
-from nodes import cell
-from nodes.cell import START_NS
-from paint_deposition.errors import PaintError
+from nodes.cell import FACING_PANEL, START_NS
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.atomizer_source import AtomizerSource
@@ -104,9 +102,12 @@ def test_a_driver_that_returns_another_way_is_heard(source, ros_context, spin, v
 @pytest.mark.parametrize(('given', 'prefix', 'scale'), [
     ({}, '', 1.0), ({'joint_prefix': 'irb_', 'angle_unit': 'deg'}, 'irb_', 180.0 / np.pi),
 ])  # fmt: skip
-def test_poses_are_those_of_the_bell(source, driver, viewer, wait_until, given, prefix, scale):
+def test_poses_are_those_of_the_bell(source, driver, viewer, wait_until, given, prefix, scale,
+                                     switched):  # fmt: skip
+    """And a joint may be the signal: the rail stands at 9."""
     offset = [0.0, 0.02, 0.15, 0.0, np.sin(0.2), 0.0, np.cos(0.2)]
-    source(tcp_offset=offset, **given)
+    signal = {'joint_topic': '/joint_states', 'trigger': '/joint_states.position[0] > 3'}
+    source(tcp_offset=offset, **signal, **given)
     robot = driver()
     wait_until(lambda: viewer.count_publishers('atomizer/pose'))
     stamps = stamps_from_now()
@@ -120,14 +121,7 @@ def test_poses_are_those_of_the_bell(source, driver, viewer, wait_until, given, 
     quaternion = np.array([q.x, q.y, q.z, q.w])
     assert abs(quaternion @ expected.values[3:]) == pytest.approx(1.0, abs=1e-9)
     assert pose.header == header('base_link', int(stamps[-1]))
-
-
-def test_a_joint_may_be_the_signal(source, driver, switched, wait_until):
-    """The rail stands at 9."""
-    node = source(joint_topic='/joint_states', trigger='/joint_states.position[0] > 3')
-    driver().move(stamps_from_now())
     assert switched(1)[0].spraying
-    wait_until(lambda: node.poses_published == len(WAY), what='the poses')
 
 
 def test_signals_are_flow_brush_and_programmed_speed(source, driver, switched):
@@ -184,16 +178,15 @@ def test_joint_states_and_signals_that_are_refused_are_told(source, driver, view
     wait_until(lambda: viewer.reports('atomizer_source: signals', told, b'\x02'))
 
 
-def test_a_trigger_alone_switches_the_gun(source, ros_context, spin, wait_until, viewer, switched):
+def test_a_trigger_alone_switches_the_gun(source, robot, wait_until, viewer, switched):
     """Poses of its own, a Bool of the PLC: sent when it says, unless the clocks differ."""
     node = source(urdf_file='', trigger='/gun')
-    robot, place = cell.Robot(ros_context), (np.zeros(3), cell.FACING_PANEL, 'cell')
-    gun = robot.create_publisher(Bool, '/gun', 10)
-    spin(robot)
+    poses, place = robot(), (np.zeros(3), FACING_PANEL, 'cell')
+    gun = poses.create_publisher(Bool, '/gun', 10)
     wait_until(lambda: gun.get_subscription_count())
-    wait_until(lambda: robot.pose_publisher.get_subscription_count() == 2, what='discovery')
+    wait_until(lambda: poses.pose_publisher.get_subscription_count() == 2, what='discovery')
     before_ns = time.time_ns()
-    robot.send_pose(before_ns, *place)
+    poses.send_pose(before_ns, *place)
     wait_until(lambda: viewer.heard['atomizer/pose'], what='the pose')
     for value in (True, False):
         gun.publish(Bool(data=value))
@@ -202,10 +195,11 @@ def test_a_trigger_alone_switches_the_gun(source, ros_context, spin, wait_until,
     assert before_ns <= Time.from_msg(first.header.stamp).nanoseconds <= time.time_ns()
     assert node.count_publishers('atomizer/pose') == 1
     wait_until(lambda: viewer.reports('atomizer_source: robot', 'the robot publishes its poses'))
-    robot.send_pose(before_ns - 30_000_000_000, *place)
+    poses.send_pose(before_ns - 30_000_000_000, *place)
     wait_until(lambda: len(viewer.heard['atomizer/pose']) == 2, what='the other clock')
     gun.publish(Bool(data=True))
-    wait_until(lambda: viewer.reports('atomizer_source: signals', '/gun has no stamps', b'\x02'))
+    told = '/gun has no stamps, and the poses of the robot are sent 3'
+    wait_until(lambda: viewer.reports('atomizer_source: signals', told, b'\x02'))
     switched(2)
 
 
@@ -228,26 +222,3 @@ def test_a_signal_that_fails_keeps_the_gun_as_it_was(source, driver, viewer, wai
         robot.say('/level', 3.0)
         states = switched(2 * row + 2)
         assert [(s.spraying, s.brush) for s in states[-2:]] == [(True, 2), (False, 2)]
-
-
-def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, wait_until):
-    source(trigger='/gun')
-    robot = driver(('/gun', Bool))
-    robot.move(stamps_from_now() - 30_000_000_000)
-    wait_until(lambda: len(viewer.heard['atomizer/pose']) == len(WAY))
-    robot.say('/gun', True)
-    told = '/gun has no stamps, and the poses of the robot are sent 29.'
-    wait_until(lambda: viewer.reports('atomizer_source: signals', told))
-    assert not viewer.heard['atomizer/state']
-
-
-def test_bad_input_is_refused(source):
-    for values, message in (
-        ({'urdf_file': ''}, 'urdf_file and base_link are empty: give the robot, or the frame'),
-        ({'urdf_file': 'nowhere.urdf'}, 'cannot read nowhere.urdf'),
-        ({'flow': '/flow'}, 'flow is given without a trigger'),
-        ({'trigger': '/io > many'}, "trigger is '/io > many': give a topic"),
-        ({'tip_link': 'bell'}, "no link 'bell'"),
-    ):
-        with pytest.raises(PaintError, match=message):
-            source(**values)

@@ -143,13 +143,13 @@ def test_passes_are_planned_and_latched(planner, pursue, viewer, wait_until, tmp
     assert len(result.path.poses) > 10
 
 
-def test_answers_go_on_and_cancel_ends_a_plan(planner, pursue, onlooker, wait_until, tmp_path):
+def test_answers_go_on_and_cancel_ends_a_plan(
+    planner, pursue, viewer, asked, wait_until, tmp_path
+):
     """What has no answer is aborted with the reason."""
     mesh = write_panel(tmp_path / 'panel.stl')
     planner(max_edge_length_m=0.01, speed_m_per_s=0.25)
-    client = onlooker().create_client(RecommendIndex, 'recommend_index')
-    wait_until(client.service_is_ready)
-    answer = client.call_async(RecommendIndex.Request(speed_m_per_s=0.3))
+    answer = asked(viewer, RecommendIndex, 'recommend_index', speed_m_per_s=0.3)
     status, result, heard = pursue(cancel_at='single passes', mesh_file=str(mesh))
     assert status == GoalStatus.STATUS_CANCELED
     assert (result.success, result.message) == (False, 'cancelled')

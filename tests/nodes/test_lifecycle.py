@@ -3,7 +3,6 @@
 import os
 import threading
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -12,37 +11,13 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from paint_msgs.srv import SaveFilm
 
-from booth import SAMPLES
-from nodes.cell import Robot, offline_um, parameters, two_passes, write_panel
+from nodes.cell import offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.managed_node import ManagedNode
-from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
 MOTION = two_passes()
 EVENTS = '/deposition_simulator/transition_event'
 POSES, STATE = 'deposition_simulator: poses', 'deposition_simulator: state'
-
-
-class Manager:
-    """Asks one node for transitions, as a lifecycle manager does."""
-
-    def __init__(self, call, name: str) -> None:
-        self._call, self._name = call, name
-
-    def __getattr__(self, transition: str):
-        """`configure()` and so on: whether it succeeded, and the state after it."""
-
-        def change() -> tuple[bool, str]:
-            wanted = Transition(label=transition)
-            answer = self._call(ChangeState, f'{self._name}/change_state', transition=wanted)
-            return answer.success, self.state
-
-        return change
-
-    @property
-    def state(self) -> str:
-        return self._call(GetState, f'{self._name}/get_state').current_state.label
 
 
 @pytest.fixture
@@ -52,8 +27,18 @@ def viewer(onlooker):
 
 @pytest.fixture
 def manager(viewer, call):
-    """`manager(node)`: a manager of this node."""
-    return lambda node: Manager(partial(call, viewer), node.get_fully_qualified_name())
+    """`manager(node)(transition)`: whether it succeeded, and the state of the node after it."""
+
+    def manager(node):
+        ask = lambda kind, of, **fields: call(viewer, kind, f'{node.NAME}/{of}', **fields)  # noqa: E731
+
+        def change(label: str) -> tuple[bool, str]:
+            answer = ask(ChangeState, 'change_state', transition=Transition(label=label))
+            return answer.success, ask(GetState, 'get_state').current_state.label
+
+        return change
+
+    return manager
 
 
 def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker, call, painted,
@@ -62,22 +47,21 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
     node = simulator(autostart=False)
     managed = manager(node)
     events = onlooker(EVENTS)
-    assert managed.state == 'unconfigured'
     assert not node.count_subscribers('atomizer/pose')
-    assert managed.activate() == (False, 'unconfigured')
-    assert managed.configure() == (True, 'inactive')
+    assert managed('activate') == (False, 'unconfigured')
+    assert managed('configure') == (True, 'inactive')
     source = robot(node)
     source.send(MOTION, slice(0, 300))
     told = '300 poses came and were not painted'
     wait_until(lambda: events.reports(POSES, told, b'\x01'))
-    assert managed.activate() == (True, 'active')
+    assert managed('activate') == (True, 'active')
     source.send(MOTION, slice(300, 600))
     film = painted(node, 300)
     wait_until(lambda: events.reports(POSES, 'painting', b'\x00'))
     assert events.value(POSES, 'poses not painted while inactive') == '300'
-    assert managed.deactivate() == (True, 'inactive')
+    assert managed('deactivate') == (True, 'inactive')
     assert call(events, SaveFilm, '/deposition_simulator/save_film', name='held').success
-    assert managed.activate() == (True, 'active')
+    assert managed('activate') == (True, 'active')
     assert np.array_equal(node.film.snapshot().film_um, film)
     # The states count that came before.
     second_pass = replace(
@@ -85,40 +69,40 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
         quaternions_xyzw=MOTION.quaternions_xyzw[300:],
     )  # fmt: skip
     assert np.array_equal(film, offline_um(node, second_pass))
-    assert managed.deactivate() == (True, 'inactive')
-    assert managed.cleanup() == (True, 'unconfigured')
+    assert managed('deactivate') == (True, 'inactive')
+    assert managed('cleanup') == (True, 'unconfigured')
     wait_until(lambda: not source.pose_publisher.get_subscription_count())
-    assert managed.configure() == (True, 'inactive')
+    assert managed('configure') == (True, 'inactive')
     assert node.film.counts.received == 0
-    assert managed.shutdown() == (True, 'finalized')
+    assert managed('shutdown') == (True, 'finalized')
     states = [event.goal_state.label for event in events.all(EVENTS)]
     assert states[-2:] == ['shuttingdown', 'finalized']
 
 
 @pytest.mark.parametrize('guns', [[], ['left', 'right']])
-def test_what_callbacks_replace_stays_until_cleanup(simulator, manager, ros_context, spin, painted,
-                                                    onlooker, wait_until, guns):  # fmt: skip
+def test_what_callbacks_replace_stays_until_cleanup(
+    simulator, manager, robot, painted, onlooker, wait_until, guns
+):
     """Subscriptions match a robot that comes later; rate and pose of the part are set anew."""
     node = simulator(atomizers=guns)
     managed = manager(node)
-    robots = [Robot(ros_context, reliable=False, namespace=gun) for gun in guns or ['']]
-    spin(*robots)
+    robots = [robot(reliable=False, namespace=gun) for gun in guns or ['']]
     # A best-effort robot is heard once the subscription has been replaced.
     wait_until(lambda: all(source.has_subscribers(1) for source in robots))
     placed = {'part_parent_frame': 'cell', 'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]}
     for change in parameters(publish_rate_hz=25.0, **placed):
         assert node.set_parameters_atomically([change]).successful
     for rows in (slice(0, 300), slice(300, 600)):
-        assert managed.deactivate() == (True, 'inactive')
-        assert managed.activate() == (True, 'active')
+        assert managed('deactivate') == (True, 'inactive')
+        assert managed('activate') == (True, 'active')
         for source in robots:
             source.send(MOTION, rows, frame_id='cell')
         painted(node, len(robots) * rows.stop)
     viewer, sent = onlooker('thickness/stats', 'part_pose'), len(robots) * 600
     wait_until(lambda: viewer.shows('thickness/stats', lambda s: s.poses_received == sent))
     wait_until(lambda: viewer.newest('part_pose'), what='the latched pose of the part')
-    assert managed.deactivate() == (True, 'inactive')
-    assert managed.cleanup() == (True, 'unconfigured')
+    assert managed('deactivate') == (True, 'inactive')
+    assert managed('cleanup') == (True, 'unconfigured')
     wait_until(lambda: not any(source.has_subscribers(1) for source in robots))
 
 
@@ -128,7 +112,7 @@ def test_what_it_reads_may_change_unconfigured(simulator, manager, viewer, wait_
     other = str(write_panel(tmp_path / 'other.stl'))
     node = simulator(autostart=False, mesh_file=str(tmp_path / 'late.stl'))
     managed = manager(node)
-    assert managed.configure() == (False, 'unconfigured')
+    assert managed('configure') == (False, 'unconfigured')
 
     def told(**values) -> str:
         return node.set_parameters_atomically(parameters(**values)).reason
@@ -136,13 +120,13 @@ def test_what_it_reads_may_change_unconfigured(simulator, manager, viewer, wait_
     wait_until(lambda: viewer.reports(STATE, 'late.stl', b'\x02'))
     assert told(mesh_file=other, max_edge_length_m=0.2, atomizers=['left', 'right']) == ''
     assert 'not all zero' in told(down=[0.0, 0.0, 0.0])
-    assert managed.configure() == (True, 'inactive')
+    assert managed('configure') == (True, 'inactive')
     wait_until(lambda: viewer.reports(STATE, 'inactive', b'\x00'))
     assert (node.mesh_file, node.gun_names) == (other, ['left', 'right'])
     refused = 'max_edge_length_m cannot change while the node is configured: the film so far lies'
     assert told(max_edge_length_m=0.1).startswith(refused)
     assert 'while the node runs: remote nodes must not choose' in told(output_directory='/tmp')
-    managed.cleanup()
+    managed('cleanup')
     assert told(max_edge_length_m=0.1) == ''
     assert 'while the node runs: remote nodes must not choose' in told(output_directory='/tmp')
 
@@ -164,8 +148,8 @@ def test_an_unforeseen_error_ends_unconfigured(start, ros_context, manager, view
     node = start(Faulty, autostart=False)
     managed = manager(node)
     publishers = len(list(node.publishers))
-    assert managed.configure() == (True, 'inactive')
-    assert managed.activate() == (False, 'unconfigured')
+    assert managed('configure') == (True, 'inactive')
+    assert managed('activate') == (False, 'unconfigured')
     assert len(list(node.publishers)) == publishers
     wait_until(lambda: viewer.reports('faulty: state', 'ZeroDivisionError: by nothing', b'\x02'))
     # One that is destroyed has no services, whoever holds on to it.
@@ -177,38 +161,34 @@ def test_an_unforeseen_error_ends_unconfigured(start, ros_context, manager, view
         Faulty(context=ros_context)
 
 
-def test_each_activation_is_a_whole_run(record, ros_context, spin, manager, wait_until, tmp_path):
+def test_each_activation_is_a_whole_run(record, robot, manager, wait_until, tmp_path):
     recorder = record(autostart=False)
     managed = manager(recorder)
-    source = Robot(ros_context)
-    spin(source)
-    assert managed.configure() == (True, 'inactive')
+    source = robot()
+    assert managed('configure') == (True, 'inactive')
     assert not list(tmp_path.iterdir())
     # A run that is there is not overwritten.
     (tmp_path / 'run').mkdir()
-    assert managed.activate() == (False, 'inactive')
+    assert managed('activate') == (False, 'inactive')
     assert not list((tmp_path / 'run').iterdir())
     (tmp_path / 'run').rmdir()
     for rows in (slice(0, 150), slice(300, 600)):
-        assert managed.activate() == (True, 'active')
+        assert managed('activate') == (True, 'active')
         wait_until(lambda: source.pose_publisher.get_subscription_count() == 1)
         source.send(MOTION, rows)
-        assert managed.deactivate() == (True, 'inactive')
+        assert managed('deactivate') == (True, 'inactive')
         run = recorder.run.folder
         assert (run / 'metadata.yaml').is_file()
         recorded = read_recording(run, None, None)
         assert np.array_equal(recorded.stamps_ns, MOTION.stamps_ns[rows])
         wait_until(lambda: not source.pose_publisher.get_subscription_count())
     assert len(list(tmp_path.glob('run*'))) == 2
-    assert managed.shutdown() == (True, 'finalized')
+    assert managed('shutdown') == (True, 'finalized')
 
 
-@pytest.mark.parametrize('node_class', [DepositionSimulator, RunRecorder])
-def test_repeated_cycles_leave_nothing_behind(start, manager, tmp_path, node_class):
-    panel = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
-    values = {'autostart': False, 'output_directory': str(tmp_path)}
-    values |= panel if node_class is DepositionSimulator else {}
-    node = start(node_class, **values)
+@pytest.mark.parametrize('kind', ['simulator', 'record'])
+def test_repeated_cycles_leave_nothing_behind(request, manager, kind):
+    node = request.getfixturevalue(kind)(autostart=False)
     managed = manager(node)
 
     def entities() -> list[int]:
@@ -218,9 +198,8 @@ def test_repeated_cycles_leave_nothing_behind(start, manager, tmp_path, node_cla
     at_first = entities()
     found = []
     for _ in range(3):
-        for transition in (managed.configure, managed.activate, managed.deactivate,
-                           managed.cleanup):  # fmt: skip
-            assert transition()[0]
+        for transition in ('configure', 'activate', 'deactivate', 'cleanup'):
+            assert managed(transition)[0]
         assert entities() == at_first
         found.append((threading.active_count(), len(os.listdir('/proc/self/fd'))))
     # The first cycle opens what stays open, shared by all nodes.

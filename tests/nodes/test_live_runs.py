@@ -1,8 +1,5 @@
 """Nodes as processes, as in a cell: a bag is replayed, painted and saved; one of them stalls."""
 
-from functools import partial
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from paint_msgs.msg import PoseProgress
@@ -10,13 +7,14 @@ from paint_msgs.srv import SaveFilm
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 
-from nodes.cell import Robot, offline_um, parameters, saved_um, two_passes, write_own_model
+from nodes.cell import parameters, saved_um, two_passes, write_own_model
 from nodes.processes import NodeProcess, recorder_process, simulator_process
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.topics import TRUST_TOPIC, header
+from scenes import painted
 
 EDGE_M = 0.03
 COARSE = {'max_edge_length_m': EDGE_M}
@@ -25,12 +23,6 @@ MOTION = two_passes(poses=POSES, trigger=False)
 STATS, PROGRESS = 'thickness/stats', 'atomizer/progress'
 # Several processes start one after the other, on a busy machine in half a minute each.
 pytestmark = pytest.mark.timeout(600)
-
-
-@pytest.fixture
-def call(onlooker, call):
-    """`call(type, name, **fields)`: the response of a service of another process."""
-    return partial(call, onlooker())
 
 
 def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wait_until, tmp_path):
@@ -45,29 +37,26 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
     ):
         assert player.wait(300.0) == 0, player.err
         wait_until(lambda: statistics.shows(STATS, lambda m: m.poses_received == 300), 'all poses')
-        saved = call(SaveFilm, '/deposition_simulator/save_film', name='film')
+        saved = call(statistics, SaveFilm, '/deposition_simulator/save_film', name='film')
         assert saved.success, saved.message
-        assert call(Trigger, '/run_recorder/stop').success
+        assert call(statistics, Trigger, '/run_recorder/stop').success
         assert recorder.wait() == 0, recorder.err
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
     assert len(read_recording(tmp_path / 'run')) == 300
     live_um = saved_um(tmp_path / 'film.csv')
     surface = read_mesh(tmp_path / 'panel.stl', 1.0, EDGE_M)
-    seen = SimpleNamespace(points=surface.points(), surface=surface)
     motion = read_recording(bag, None, '/atomizer/state')
-    expected_um = offline_um(seen, motion, precision='double')
+    expected_um = painted(surface.points(), motion, None, 'double', surface).film_um
     assert expected_um.max() > 1.0
     assert np.abs(live_um - expected_um).max() < 1e-6 * expected_um.max()
 
 
-def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(ros_domain, onlooker, wait_until, tmp_path):
+def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(asked, onlooker, wait_until, tmp_path):
     films = tmp_path / 'films'
     fine = {'max_edge_length_m': 0.004, 'output_directory': films}
     with simulator_process(tmp_path, **fine) as simulator:
-        client = onlooker().create_client(SaveFilm, '/deposition_simulator/save_film')
-        wait_until(client.service_is_ready, what='the service')
-        client.call_async(SaveFilm.Request(name='film'))
+        asked(onlooker(), SaveFilm, '/deposition_simulator/save_film', name='film')
         wait_until(lambda: films.is_dir() and any(films.iterdir()), what='the first file')
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
@@ -75,28 +64,28 @@ def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(ros_domain, onlooker, wai
     assert {path.name for path in films.iterdir()} == {'film.ply', 'film.csv', 'film.json'}
 
 
-def test_ctrl_c_while_a_model_is_prepared_ends_it(ros_domain, call, tmp_path):
+def test_ctrl_c_while_a_model_is_prepared_ends_it(onlooker, call, tmp_path):
     """The trial of this effect would never end."""
     own = write_own_model(tmp_path)
     with simulator_process(tmp_path, allow_user_effects=True) as simulator:
         (change,) = (p.to_parameter_msg() for p in parameters(model_file=str(own)))
-        answer = call(SetParameters, '/deposition_simulator/set_parameters', parameters=[change])
+        service = SetParameters, '/deposition_simulator/set_parameters'
+        answer = call(onlooker(), *service, parameters=[change])
         assert answer.results[0].successful, answer.results[0].reason
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
 
 
-def test_a_stall_loses_nothing(ros_domain, ros_context, spin, wait_until, onlooker, tmp_path):
+def test_a_stall_loses_nothing(robot, wait_until, onlooker, tmp_path):
     """Stopped as by a debugger or a swapping machine, while a recorder goes on beside it."""
-    robot, viewer = Robot(ros_context), onlooker(STATS)
-    spin(robot)
+    source, viewer = robot(), onlooker(STATS)
     with simulator_process(tmp_path, **COARSE) as sim, recorder_process(tmp_path) as recorder:
-        wait_until(lambda: robot.has_subscribers(2), what='both')
-        robot.send(MOTION, slice(0, 300))
+        wait_until(lambda: source.has_subscribers(2), what='both')
+        source.send(MOTION, slice(0, 300))
         wait_until(lambda: viewer.newest(STATS), what='statistics')
         sim.stall()
         # More than a second of the middleware's own patience, less than the queues hold.
-        robot.send(MOTION, slice(300, POSES))
+        source.send(MOTION, slice(300, POSES))
         sim.go_on()
         wait_until(lambda: viewer.newest(STATS).poses_received == POSES, what='all poses painted')
         assert viewer.newest(STATS).poses_rejected == 0

@@ -1,6 +1,7 @@
 """What all nodes share: tables of parameters, diagnostics, and a coloured mesh."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -10,13 +11,19 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
+from booth import SAMPLES
 from nodes.cell import parameters
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import PaintError
+from paint_deposition.files.model_file import write_model
 from paint_deposition.nodes.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.parameters import NodeParameter
 from paint_deposition.nodes.topics import coloured_mesh, header, white_marker
 from paint_deposition.report.colour_scales import FILM_PALETTE
-from test_packaging import NODES, table_of
+from refusals import refusal
+from robot_arm import URDF
+from test_packaging import NODES, class_of, table_of
 
 TABLE = {
     'rate_hz': NodeParameter(2.0, 'Rate [Hz]', (0.1, 100.0)),
@@ -80,10 +87,7 @@ def test_the_line_for_a_wrong_override(declared):
         ({'mesh_fil': 'x'}, "tester has no parameter mesh_fil; did you mean 'mesh_file'?"),
         ({'speed': 1.0}, 'tester has no parameter speed; '),
     ):
-        with pytest.raises(PaintError) as refused:
-            declared(**overrides)
-        assert str(refused.value).startswith(line)
-        assert '\n' not in str(refused.value)
+        assert refusal(PaintError, declared, **overrides).startswith(line)
 
 
 def test_later_changes_are_checked_too(declared):
@@ -117,15 +121,69 @@ def test_a_home_folder_is_found_at_the_start_and_later(declared, monkeypatch, tm
     assert 'Wrong parameter type' in result.reason
 
 
+PART = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
+READINGS = PART | {'measurements_file': str(SAMPLES / 'panel_study/panel_577.csv')}
+BAG = str(SAMPLES / 'door_horizontal')
+GUNS = PART | {'atomizers': ['left', 'right']}
+REFUSED = {
+    'atomizer_source': [
+        ({}, 'urdf_file and base_link are empty: give the robot, or the frame'),
+        ({'urdf_file': 'nowhere.urdf'}, 'cannot read nowhere.urdf'),
+        ({'urdf_file': str(URDF), 'flow': '/flow'}, 'flow is given without a trigger'),
+        ({'urdf_file': str(URDF), 'trigger': '/io > many'}, "is '/io > many': give a topic"),
+        ({'urdf_file': str(URDF), 'tip_link': 'bell'}, "no link 'bell'"),
+    ],
+    'bag_player': [
+        ({'bag': ''}, 'bag is empty: give the path of a recording'),
+        ({'bag': '/nowhere'}, '/nowhere: no such file; give a bag'),
+        ({'bag': BAG, 'pose_topic': 'atomizer/pos'}, 'its PoseStamped topics: /atomizer/pose'),
+        ({'bag': BAG, 'state_topic': '/gun'}, 'its state topics: /atomizer/state'),
+    ],
+    'deposition_simulator': [
+        (GUNS | {'model_files': ['thin.yaml']}, 'names 1 models for 2 atomizers: give'),
+        (GUNS | {'model_files': 2 * ['thin.yaml'], 'model_file': 'thin.yaml'},
+         'atomizers and model_file another: give model_file'),
+        (GUNS | {'model_files': ['thin.yaml', 'sagging.yaml']},
+         r'left and right differ in what acts on the finished film.*\(sag\)'),
+        (GUNS | {'atomizers': ['left', 'left']}, 'atomizers is .*give different names'),
+        (GUNS | {'atomizers': ['../robot']}, 'atomizers is .*give different names'),
+    ],
+    'model_comparison': [
+        (READINGS | {'measurements_file': ''}, 'measurements_file is empty'),
+        (READINGS | {'measurements_file': 'nowhere.csv'}, 'nowhere.csv: no such file'),
+        (READINGS | {'mesh_file': ''}, 'mesh_file is empty'),
+        (READINGS | {'mesh_scale': 0.01}, "lie off the part's surface"),
+    ],
+    'run_recorder': [
+        ({'mesh_file': '/nowhere.stl'}, 'mesh_file /nowhere.stl: No such file or directory'),
+        ({'output_directory': '/dev/null/runs', 'name': 'run'},
+         'cannot create /dev/null/runs/run'),
+    ],
+    'rws_source': [
+        ({}, 'trigger is empty'),
+        ({'trigger': 'a', 'flow': 'a'}, 'a signal is named twice: a a'),
+        ({'trigger': 'a', 'url': 'http://me:secret@127.0.0.1:9'}, 'url holds a login, .*RWS_PASS'),
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('node', REFUSED)
+def test_what_a_node_cannot_start_with_is_refused_in_a_line(node, start, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_model('thin.yaml', DepositionModel())
+    write_model('sagging.yaml', DepositionModel(effects=(Sag.typical(),)))
+    for values, words in REFUSED[node]:
+        line = refusal(PaintError, start, class_of(node), **values)
+        assert re.search(words, line), line
+        assert 'secret' not in line
+
+
 @pytest.mark.parametrize('node', NODES)
 def test_every_description_states_a_unit_and_every_fixed_one_why(node):
     for name, row in table_of(node).items():
         assert row.description.endswith(']'), name
         assert row.checked(name, row.default) == row.default, name
         assert len(row.fixed_because) > 20 or node not in ('bag_player', 'run_recorder'), name
-
-
-STAMPS_NS = 0, 1_758_000_123_456_789_012
 
 
 # Names of every length modulo 8: what comes behind them must keep its alignment.
@@ -135,7 +193,7 @@ def test_the_mesh_is_the_marker_that_rclpy_builds(frame_id, triangles):
     rng = np.random.default_rng(7)
     vertices, faces = rng.normal(size=(40, 3)), rng.integers(0, 40, size=(triangles, 3))
     mesh = coloured_mesh(vertices, faces, frame_id, 'thickness')
-    for stamp_ns in STAMPS_NS:
+    for stamp_ns in (0, 1_758_000_123_456_789_012):
         rows = rng.integers(0, len(FILM_PALETTE), size=len(vertices))
         data = mesh(stamp_ns, FILM_PALETTE, rows)
         expected = white_marker(Marker.TRIANGLE_LIST, 'thickness', 0, frame_id)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -60,25 +61,14 @@ def _odd(kind: str, rng: random.Random) -> object:
     return odd_message(message_class(f'{package}/msg/{name}'), rng)
 
 
-class Peer:
-    """Publishes odd messages on every topic that a node subscribes to."""
-
-    def __init__(self, node) -> None:
-        self._node = node
-        self._publishers = {}
-
-    def send(self, subscribed, rng: random.Random) -> None:
-        """An odd message on each of the topics of these nodes."""
-        latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        for subscription in [each for node in subscribed for each in node.subscriptions]:
-            topic, kind = subscription.topic_name, subscription.msg_type
-            if topic not in self._publishers:
-                self._publishers[topic] = self._node.create_publisher(kind, topic, latched)
-            self._publishers[topic].publish(odd_message(kind, rng))
-
-    @property
-    def is_heard(self) -> bool:
-        return all(publisher.get_subscription_count() for publisher in self._publishers.values())
+def send_odd(peer: Node, publishers: dict[str, Publisher], nodes, rng: random.Random) -> None:
+    """An odd message on every topic that these nodes subscribe to."""
+    latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    for subscription in [each for node in nodes for each in node.subscriptions]:
+        topic, kind = subscription.topic_name, subscription.msg_type
+        if topic not in publishers:
+            publishers[topic] = peer.create_publisher(kind, topic, latched)
+        publishers[topic].publish(odd_message(kind, rng))
 
 
 MESSAGES = int(os.environ.get('PAINT_MESSAGES', '60'))
@@ -113,23 +103,23 @@ def made(closed, tmp_path):
 def test_no_odd_message_ends_a_node(name, made, ros_context, spin, executor, wait_until):
     if name == 'tf':
         pytest.importorskip('tf2_msgs')
-    peer_node = Node('peer', context=ros_context)
-    signals = [peer_node.create_publisher(Float64, topic, 10) for topic in ('gun', 'flow')]
-    poses = peer_node.create_publisher(PoseStamped, 'atomizer/pose', 10)
+    peer, publishers = Node('peer', context=ros_context), {}
+    signals = [peer.create_publisher(Float64, topic, 10) for topic in ('gun', 'flow')]
+    poses = peer.create_publisher(PoseStamped, 'atomizer/pose', 10)
     node = made(name)
-    spin(peer_node)
+    spin(peer)
     rng = random.Random(sum(map(ord, name)))
     if name in ('joints', 'tf', 'trigger'):
         wait_until(lambda: all(s.get_subscription_count() for s in signals), what='signals')
     if name == 'recorder':
         poses.publish(PoseStamped())
         wait_until(lambda: len(node.recorded) > 0, what='a recorded topic')
-    peer = Peer(peer_node)
-    others = [made('web_view')] if name == 'recorder' else []
-    peer.send([node, *others], rng)
-    wait_until(lambda: peer.is_heard, what='discovery')
+    nodes = [node, made('web_view')] if name == 'recorder' else [node]
+    send_odd(peer, publishers, nodes, rng)
+    heard = lambda: all(each.get_subscription_count() for each in publishers.values())  # noqa: E731
+    wait_until(heard, what='discovery')
     for _ in range(MESSAGES):
-        peer.send([node, *others], rng)
+        send_odd(peer, publishers, nodes, rng)
         for _ in range(10):
             executor.spin_once(timeout_sec=0.0)
     sent_ns = time.monotonic_ns()

@@ -15,14 +15,13 @@ import paint_deposition as pd
 from nodes.cell import START_NS, Broadcaster, offline_um, parameters, two_passes
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import STATE_TOPIC
-from paint_deposition.motion.transforms import Rigid
+from paint_deposition.motion.transforms import Rigid, moved
 from paint_deposition.nodes.bags.bag_player import BagPlayer
 from paint_deposition.nodes.topics import header
 
 PASSES = two_passes(poses=200, trigger=False)
 # The part hangs turned by 90 degrees about z, a metre along the cell's x.
 PART_POSE = [1.0, 0.0, 0.5, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)]
-SET_PARAMETERS = '/deposition_simulator/set_parameters'
 HAS_TF = importlib.util.find_spec('tf2_msgs') is not None
 
 
@@ -35,8 +34,7 @@ def recorded(simulator, record, robot, painted, wait_until):
     source = robot(node)
     # The recorder subscribes once it has found the publisher.
     wait_until(lambda: source.has_subscribers(2))
-    poses = Rigid.of(PART_POSE).applied(PASSES.positions_m, PASSES.quaternions_xyzw)
-    source.send(pd.Trajectory(PASSES.stamps_ns, *poses, 'base_link'), frame_id='base_link')
+    source.send(moved(PASSES, Rigid.of(PART_POSE), 'base_link'), frame_id='base_link')
     film = painted(node, len(PASSES))
     wait_until(lambda: recorder.run.counts['/atomizer/pose'] == len(PASSES), what='all recorded')
     recorder.close()
@@ -80,14 +78,14 @@ def test_the_pose_of_the_part_is_unset_by_an_empty_list_of_any_kind(simulator, o
         assert node.frame.on_part(PoseStamped(header=header('base_link', 0))) is not None
         value = ParameterValue(type=getattr(ParameterType, f'PARAMETER_{kind}_ARRAY'))
         changes = [ParameterMessage(name='part_pose', value=value)]
-        (result,) = call(viewer, SetParameters, SET_PARAMETERS, parameters=changes).results
+        service = SetParameters, '/deposition_simulator/set_parameters'
+        (result,) = call(viewer, *service, parameters=changes).results
         assert result.successful, result.reason
         assert list(node.values['part_pose']) == []
         assert list(node.get_parameter('part_pose').value) == []
 
 
 MOTION = two_passes(poses=600)
-POSE_TOPIC = '/atomizer/pose'
 CAMERA = Rigid.of([0.3, -0.2, 0.7, *Rotation.from_euler('xyz', [0.3, 0.5, 0.7]).as_quat()])
 LAST_NS = int(MOTION.stamps_ns[-1])
 TF_NS = range(START_NS - 20_000_000, LAST_NS + 40_000_000, 20_000_000)
@@ -129,7 +127,7 @@ def test_the_recorded_run_of_a_conveyor_has_the_film_that_was_seen(
     node.catch_up()
     film = node.film.snapshot().film_um
     counts = recorder.run.counts
-    wait_until(lambda: (counts[POSE_TOPIC], counts['/tf']) == (len(MOTION), len(sent)))
+    wait_until(lambda: (counts['/atomizer/pose'], counts['/tf']) == (len(MOTION), len(sent)))
     recorder.close()
     read = read_recording(recorder.run.folder, state_topic=STATE_TOPIC)
     assert np.array_equal(offline_um(node, read), film)

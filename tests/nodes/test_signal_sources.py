@@ -268,14 +268,3 @@ def test_a_library_that_is_missing_ends_the_node(start, monkeypatch):
     monkeypatch.setattr(OpcuaSource, 'LIBRARY', 'nowhere_at_all.client')
     with pytest.raises(PaintError, match='run: pip install nowhere_at_all'):
         start(OpcuaSource, trigger='gun')
-
-
-@pytest.mark.parametrize(('values', 'words'), [
-    ({}, 'trigger is empty'),
-    ({'trigger': 'a', 'flow': 'a'}, 'a signal is named twice: a a'),
-    ({'trigger': 'a', 'url': 'http://me:secret@127.0.0.1:9'}, 'url holds a login, .*RWS_PASS'),
-])  # fmt: skip
-def test_signals_that_are_not_named_are_refused(start, values, words):
-    with pytest.raises(PaintError, match=words) as refused:
-        start(RwsSource, **values)
-    assert 'secret' not in str(refused.value)

@@ -46,9 +46,7 @@ def arm(stamp: int) -> Rigid:
 
 
 def poses(viewer) -> tuple[list[int], np.ndarray]:
-    count = len(viewer.heard['atomizer/pose'])
-    heard = [viewer.decoded('atomizer/pose', row) for row in range(count)]
-    rows = []
+    heard, rows = viewer.all('atomizer/pose'), []
     for message in heard:
         p, q = message.pose.position, message.pose.orientation
         rows.append([p.x, p.y, p.z, q.x, q.y, q.z, q.w])

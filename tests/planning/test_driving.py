@@ -246,6 +246,3 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
     done = paint('place', *given, *grid, '-o', tmp_path / 'place', '--json')
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)['reached'] == [[1.0]]
-    done = paint('place', *given[:2], '--urdf', robot_arm.URDF, '-o', tmp_path / 'place')
-    assert done.returncode == 2
-    assert '--part-pose' in done.stderr

@@ -20,11 +20,6 @@ NARROW = pd.DepositionModel(
 )
 
 
-@pytest.fixture(scope='module')
-def planned():
-    return plan_faces(bumper(), NARROW, PlanRequest(target_um=20.0), 'part')
-
-
 def outward(face) -> np.ndarray:
     mean = face.surface.vertex_areas_m2 @ face.surface.normals
     return mean / np.linalg.norm(mean)
@@ -67,7 +62,8 @@ def level_pass(y_m: float, begin_m=0.0, end_m=1.0, one_way: bool = False) -> Pla
 
 
 @pytest.mark.slow
-def test_faces_paint_the_whole_part_more_evenly_when_blended_and_keep_clear(planned):
+def test_faces_paint_the_whole_part_more_evenly_when_blended_and_keep_clear():
+    planned = plan_faces(bumper(), NARROW, PlanRequest(target_um=20.0), 'part')
     assert planned.statistics.coverage == 1.0
     assert planned.sigma_n < planned.sigma_n_unblended
     assert planned.sigma_n < 0.6 * planned.sigma_n_unblended

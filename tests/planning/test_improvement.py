@@ -15,7 +15,8 @@ from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.inference.fitting.parameters import Posterior
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.inference.fitting.pattern_vector import PatternVector
+from paint_deposition.model.eq1_pattern import PATTERN, PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.part.zones import Zone, Zones
@@ -166,21 +167,14 @@ def test_impossible_limits_are_named(panel, even, wanted, words):
         pd.improve(panel, even.trajectory, NARROW, **wanted)
 
 
-def _known(**widths):
-    """What is known of the bell: these standard deviations, next to none else."""
-    p = SKEWED.planar
-    means = {
-        'log_K1': np.log(p.K1_cm3_per_s), 'K2': p.K2, 'K3_cos_phi': p.K3 * np.cos(p.phi_rad),
-        'K3_sin_phi': p.K3 * np.sin(p.phi_rad), 'r_m': p.r_m,
-        'log_sigma1': np.log(p.sigma1_m), 'log_sigma2': np.log(p.sigma2_m),
-    }  # fmt: skip
-    rows = np.diag([widths.get(name, 1e-6) ** 2 for name in means]).tolist()
-    return Posterior(mean=means, covariance=dict(zip(means, rows, strict=True)))
-
-
 @pytest.mark.slow
 def test_a_level_that_is_not_known_costs_no_evenness(panel, even, levelled):
-    known = _known(log_K1=0.2)
+    of = [coordinate.name for coordinate in PATTERN]
+    mean = PatternVector().encode([SKEWED.planar])
+    rows = np.diag([0.04 if name == 'log_K1' else 1e-12 for name in of]).tolist()
+    known = Posterior(
+        mean=dict(zip(of, mean, strict=True)), covariance=dict(zip(of, rows, strict=True))
+    )
     unsure = pd.improve(panel, even.trajectory, SKEWED, posterior=known, paint_weight=0.0)
     assert unsure.after.sigma_n == pytest.approx(levelled.after.sigma_n, rel=0.02)
     assert unsure.after.mean_um == pytest.approx(levelled.after.mean_um, rel=2e-3)

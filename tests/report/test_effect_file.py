@@ -3,18 +3,17 @@
 import json
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
+import scenes
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.effect_file import load_effect_file
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.diagnosis import closed_forms
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
@@ -27,6 +26,7 @@ from paint_deposition.report.write import write_film
 from paint_deposition.report.write_inference import effect_entry, write_effect_file
 from paint_deposition.report.write_plans import gauge_turns
 from small_campaign import small_campaign
+from surfaces import sheet
 
 KNOTS, SD = 12, 0.02
 RANGES = {
@@ -63,9 +63,7 @@ def door(tmp_path_factory):
 
 def film_um(experiment, model: pd.DepositionModel) -> np.ndarray:
     """What the gauge shows at the readings."""
-    painted = FilmIntegrator(experiment.measured_points, model, 'double', parallel=False)
-    painted.add(experiment.path)
-    return painted.gauge_um
+    return scenes.painted(experiment.measured_points, experiment.path, model, 'double').gauge_um
 
 
 def factor_at(effect, x: np.ndarray) -> np.ndarray:
@@ -121,23 +119,15 @@ def test_names_of_effects_of_the_library_are_not_taken_and_those_of_parts_are_fi
     assert {name: write_inference.file_name(name) for name in names} == names
 
 
-@pytest.fixture
-def painted():
-    """A square metre with a ramp of film, and its statistics."""
-    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], dtype=float)
-    surface = pd.Surface.from_triangles(corners, np.array([[0, 1, 2], [0, 2, 3]]), 0.2)
-    film = 50.0 * surface.vertices_m[:, 0] / 3.0
-    stats = film_statistics(film, surface.vertex_areas_m2, 20.0)
-    return surface, film, stats
-
-
-def test_figures_of_any_kind_are_written_and_an_older_film_stays_unless_told(painted, tmp_path):
+def test_figures_of_any_kind_are_written_and_an_older_film_stays_unless_told(tmp_path):
     """Mesh and table are held against each other where `paint simulate` is tried out."""
-    details, stats = {'poses': np.int64(7), 'rate': math.inf}, painted[-1]
-    *_, figures = write_film(tmp_path / 'new', *painted, details=details)
+    surface = sheet(lambda x, z: 0.0 * x)
+    film = 50.0 * (surface.vertices_m[:, 0] + 0.5) / 3.0
+    stats = film_statistics(film, surface.vertex_areas_m2, 20.0)
+    details = {'poses': np.int64(7), 'rate': math.inf}
+    *_, figures = write_film(tmp_path / 'new', surface, film, stats, details=details)
     content = json.loads(figures.read_text())
     assert (content['mean_um'], content['poses'], content['rate']) == (stats.mean_um, 7, None)
-    surface, film, stats = painted
     csv = write_film(tmp_path, surface, film, stats)[1]
     with pytest.raises(pd.PaintError, match=r'film\.ply is there already'):
         write_film(tmp_path, surface, 2 * film, stats)
@@ -149,36 +139,21 @@ def test_figures_of_any_kind_are_written_and_an_older_film_stays_unless_told(pai
 BY_HAND = 0.3012345678901234
 
 
-@pytest.fixture(scope='module')
-def fitted(tmp_path_factory):
-    campaign = small_campaign(tmp_path_factory.mktemp('campaign'))
-    start = pd.DepositionModel(projection=Projection(model_plane_m=BY_HAND))
-    return refit(campaign, start, AirDrift)
-
-
-@pytest.fixture(scope='module')
-def file(tmp_path_factory, fitted) -> Path:
-    path = tmp_path_factory.mktemp('model') / 'model.yaml'
-    known = fitted.posterior, estimates(fitted.history[-1].fit)
-    write_inference.write_fitted(path, fitted.study, fitted.history, *known)
-    return path
-
-
 @pytest.mark.slow
-def test_fitted_numbers_have_few_digits_and_give_the_fitted_film(file, fitted):
+def test_fitted_numbers_have_few_digits_and_give_the_fitted_film(tmp_path):
+    start = pd.DepositionModel(projection=Projection(model_plane_m=BY_HAND))
+    fitted = refit(small_campaign(tmp_path), start, AirDrift)
+    file, known = tmp_path / 'model.yaml', (fitted.posterior, estimates(fitted.history[-1].fit))
+    write_inference.write_fitted(file, fitted.study, fitted.history, *known)
     numbers = re.findall(r': (-?[\d.]+)(?:e[+-]?\d+)?\b', file.read_text())
     assert len(numbers) > 10
     long = [n for n in numbers if len(n.lstrip('-0.').replace('.', '')) > 8]
     assert long == [str(BY_HAND)]
-    experiment = fitted.study.campaign.experiments[1]
-
-    def film_on_vertices_um(model: pd.DepositionModel) -> np.ndarray:
-        surface = experiment.surface
-        integrator = FilmIntegrator(surface.points(), model, 'double', surface)
-        integrator.add(experiment.path)
-        return integrator.gauge_um
-
-    expected, found = map(film_on_vertices_um, (fitted.model, pd.read_model(file)))
+    door = fitted.study.campaign.experiments[1]
+    expected, found = (
+        scenes.painted(door.surface.points(), door.path, model, 'double', door.surface).gauge_um
+        for model in (fitted.model, pd.read_model(file))
+    )
     assert np.abs(found - expected).max() < 1e-6 * expected.max()
 
 

@@ -11,7 +11,6 @@ import pytest
 import paint_deposition as pd
 from chromium import CHROMIUM, Chromium
 from paint_deposition.api.replaying import Replay
-from paint_deposition.cli.main import run
 from paint_deposition.report.live_page import STEP_UM, Page, Scene
 
 ARRAYS = {'float32': np.float32, 'uint32': np.uint32, 'uint16': np.uint16, 'uint8': np.uint8}
@@ -140,22 +139,6 @@ def test_a_page_for_other_machines_gets_a_token_and_one_for_this_machine_hears_i
     assert urlopen(page.url).headers['Content-Security-Policy'].startswith("default-src 'self'")
     with pytest.raises(pd.PaintError, match='in use; choose another port'):
         Page(page.scene, port=int(page.url.split(':')[2].strip('/')))
-
-
-@pytest.mark.parametrize(
-    ('words', 'reason'),
-    [
-        (['watch'], 'give RUN, or --live'),
-        (['watch', '--live'], 'give --mesh'),
-        (['watch', '--live', '--mesh', 'door.stl', '--rate', '4'], '--rate is for a recorded RUN'),
-        (['watch', 'nowhere'], 'is not there; give a recorded run'),
-        (['watch', '.', '--port', '0'], 'does not name the mesh'),
-        (['watch', 'nowhere', '--tolerance-um', '2'], 'no --target-um'),
-    ],
-)
-def test_watch_says_what_it_lacks(words, reason, capsys):
-    assert run(words) == 2
-    assert reason in capsys.readouterr().err
 
 
 @pytest.mark.slow

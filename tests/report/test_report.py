@@ -42,14 +42,6 @@ def comparisons(diagnosis):
     return tuple(compare(diagnosis.study, step.model) for step in diagnosis.history)
 
 
-@pytest.fixture(scope='module')
-def proposals(diagnosis):
-    door = diagnosis.study.campaign.experiments[1]
-    places = [Place(door.points.positions_m[k], door.name, 'tells them apart') for k in (3, 20)]
-    sprays = [Spray('the same passes at half the flow', ('air_drift', 'tcp_tilt'), 4.2, 0.6)]
-    return places, sprays
-
-
 def of(told, beside, proposals=((), ()), older=()) -> ReportData:
     told = replace(told)
     vars(told).update(comparisons=beside, proposals=proposals)
@@ -70,8 +62,11 @@ def tell(diagnosis, comparisons):
 
 
 @pytest.fixture(scope='module')
-def report(tell, diagnosis, proposals):
-    return tell(diagnosis, proposals=proposals)
+def report(tell, diagnosis):
+    door = diagnosis.study.campaign.experiments[1]
+    places = [Place(door.points.positions_m[k], door.name, 'tells them apart') for k in (3, 20)]
+    sprays = [Spray('the same passes at half the flow', ('air_drift', 'tcp_tilt'), 4.2, 0.6)]
+    return tell(diagnosis, proposals=(places, sprays))
 
 
 @pytest.fixture(scope='module')

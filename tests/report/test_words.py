@@ -80,14 +80,6 @@ def test_a_learned_law_is_told_by_its_curve_and_its_range():
 KNOTS = 24
 
 
-def like(covariate: str, low: float, high: float, curve):
-    """A learned law with the values of a function at its knots."""
-    law = LEARNED[covariate](low=low, high=high, learned=(0.0,) * KNOTS)
-    many = np.linspace(low, high, 100_001)
-    at_knots = np.interp(law.knots, law.axis(many), curve(many))
-    return law.model_copy(update={'learned': tuple(at_knots)})
-
-
 @pytest.fixture(scope='module')
 def study(tmp_path_factory):
     return Study.of(small_campaign(tmp_path_factory.mktemp('campaign')))
@@ -99,7 +91,10 @@ def shown(study: Study, *effects) -> ReportData:
 
 @pytest.mark.slow
 def test_a_curve_is_drawn_with_its_closed_form_and_with_its_band_if_it_is_known(study):
-    law = like('edge_distance_m', 0.0, 0.25, lambda d_m: 0.4 * np.exp(-((d_m / 0.03) ** 2)))
+    law = LEARNED['edge_distance_m'](low=0.0, high=0.25, learned=(0.0,) * KNOTS)
+    d_m = np.linspace(0.0, 0.25, 100_001)
+    at_knots = np.interp(law.knots, law.axis(d_m), 0.4 * np.exp(-((d_m / 0.03) ** 2)))
+    law = law.model_copy(update={'learned': tuple(at_knots)})
     plain = learned_figure(shown(study, law))
     curve = plain['charts'][0]['data'][0]
     known = law.model_copy(update={'sd': (0.02,) * (KNOTS - 1) + (0.5,)})

@@ -107,12 +107,9 @@ def modules() -> Poses:
     return Poses(0, 120).go(400, 120, 500, 1).go(400, 220, 700).go(0, 220, 500, 2)
 
 
-PROGRAMS = (
+@pytest.mark.parametrize('program', [
     zigzag, arrays, procedures, styles, planes, conveyor, outputs, tools, modules,
-)  # fmt: skip
-
-
-@pytest.mark.parametrize('program', PROGRAMS)
+])  # fmt: skip
 def test_a_paint_program_has_the_motion_that_it_means(program, tmp_path):
     path = FOLDER / program.__name__
     paths = [path / 'door.pgf' if path.is_dir() else path.with_suffix('.mod')]

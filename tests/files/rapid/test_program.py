@@ -1,22 +1,22 @@
 """RAPID programs: what they are made of, their motion, and what cannot be followed."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import refusals
 from paint_deposition.errors import PlanError, RecordingError
 from paint_deposition.files.rapid import program as rapid
 from paint_deposition.files.rapid.program import module_text, read_program
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import GunSwitch, Move
 
-AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
-
 
 def target(x, y=0.0, z=0.0, wxyz='1,0,0,0') -> str:
-    return f'[[{x},{y},{z}],[{wxyz}],{AXES}]'
+    return f'[[{x},{y},{z}],[{wxyz}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]'
 
 
 @pytest.fixture
@@ -33,12 +33,7 @@ def read(tmp_path):
     return read
 
 
-def refusal(read, *arguments, **options) -> str:
-    with pytest.raises(RecordingError) as refused:
-        read(*arguments, **options)
-    text = str(refused.value)
-    assert '\n' not in text
-    return text
+refusal = partial(refusals.refusal, RecordingError)
 
 
 def test_declared_targets_speeds_and_zones(read):

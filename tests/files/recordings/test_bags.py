@@ -5,11 +5,13 @@ import shutil
 import sqlite3
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 import paint_deposition as pd
+import refusals
 from files.recorded import POSE, START_NS, Messages, pose_entries, straight_pass, write_bag
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
@@ -27,12 +29,7 @@ def same(read: pd.Trajectory, written: pd.Trajectory) -> bool:
     )
 
 
-def refusal(*arguments) -> str:
-    with pytest.raises(RecordingError) as refused:
-        pd.read_recording(*arguments)
-    text = str(refused.value)
-    assert '\n' not in text
-    return text
+refusal = partial(refusals.refusal, RecordingError, pd.read_recording)
 
 
 @pytest.mark.parametrize('storage', ['ros1', 'sqlite3', 'mcap'])
@@ -86,13 +83,11 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     assert gun.notes == ()
 
 
-OLD_TYPES = {STATE_TYPE: STATE_TEXT, 'cell_msgs/msg/Valve': 'bool open\n'}
-
-
 @pytest.mark.parametrize('sourced', [True, False])
 def test_states_of_an_older_recorder_are_read_without_ros(tmp_path, monkeypatch, sourced):
     """Its sqlite3 bags hold no definitions; those of other messages have to be installed."""
-    written, made = straight_pass(triggers=False), Messages(state_types=OLD_TYPES)
+    types = {STATE_TYPE: STATE_TEXT, 'cell_msgs/msg/Valve': 'bool open\n'}
+    written, made = straight_pass(triggers=False), Messages(state_types=types)
     header = made.header(START_NS)
     state = made.store.types[STATE_TYPE](header, True, 0.8, 0.0, 0.0, 0.0, 0, 0.0, 0.0)
     valve = made.store.types['cell_msgs/msg/Valve'](True)

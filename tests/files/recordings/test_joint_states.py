@@ -14,6 +14,7 @@ from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.pose_topics import sources_of_poses
 from paint_deposition.motion.transforms import Rigid
+from refusals import refusal
 from robot_arm import JOINTS, TIP_M, URDF, sweep, tip_poses
 from scenes import stamps_ns
 
@@ -83,25 +84,6 @@ def test_another_link_and_another_base(tmp_path):
     assert np.allclose(read.positions_m, position - back - [0, 0, 0.4], atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ('given', 'words'),
-    [
-        ({}, 'name a pose topic; it has no PoseStamped topic; it has joint states (give urdf)'),
-        ({'urdf': 'ARM', 'tip_link': 'tool1'}, "has no link 'tool1'; did you mean 'tool0'?"),
-        ({'urdf': 'ARM', 'base_link': 'tool0', 'tip_link': 'base_link'}, 'does not hang on'),
-        ({'urdf': 'ARM', 'tf': ['a', 'b']}, 'leave one of them out'),
-        ({'urdf': 'ARM', 'pose_topic': '/joints'}, 'no topic /joints; its JointState topics'),
-        ({'urdf': 'ARM', 'frame_id': 'door'}, "in frame 'base_link', the mesh in 'door'"),
-    ],
-)
-def test_missing_links_and_joints_are_named(given, words, tmp_path):
-    bag = joint_bag(tmp_path / 'run', rows_of()[:3])
-    given = {key: str(URDF) if value == 'ARM' else value for key, value in given.items()}
-    with pytest.raises(RecordingError) as refused:
-        read_recording(bag, **given)
-    assert words in str(refused.value)
-
-
 def test_joints_that_are_not_recorded_or_never_known_together_are_named(tmp_path):
     with pytest.raises(RecordingError, match=r'has nothing of wrist_roll of arm\.urdf'):
         read_joints(tmp_path / 'few', rows_of(sweep()[:, :5], JOINTS[:5]))
@@ -155,12 +137,6 @@ def test_joint_states_that_are_not_used_are_counted(tmp_path):
     }
 
 
-def logged_twice(messages, topic):
-    """Messages of 3 s, (stamp, message), as from a log that is played in a loop."""
-    both = [message for _, message in messages] * 2
-    return [(topic, 20_000_000 * row, message) for row, message in enumerate(both, start=1)]
-
-
 def test_joints_and_transforms_that_start_again_are_refused_and_named(tmp_path):
     """A single one that comes late by more than a second is none of another stream."""
     made, again = Messages(), 'the stamps start again 3.020 s after its first message; cut the bag'
@@ -173,10 +149,11 @@ def test_joints_and_transforms_that_start_again_are_refused_and_named(tmp_path):
         ('/joint_states', joints, {'urdf': str(URDF)}),
         ('/tf', transforms, {'tf': ['world', 'tool0']}),
     ):
-        folder = write_bag(tmp_path / f'{topic[1:]}_twice', logged_twice(messages, topic))
-        with pytest.raises(RecordingError) as refused:
-            read_recording(folder, **options)
-        assert again in str(refused.value)
+        # As from a log that is played in a loop.
+        both = [message for _, message in messages] * 2
+        entries = [(topic, 20_000_000 * row, message) for row, message in enumerate(both, start=1)]
+        folder = write_bag(tmp_path / f'{topic[1:]}_twice', entries)
+        assert again in refusal(RecordingError, read_recording, folder, **options)
         with open_bag(folder) as bag:
             (source,) = sources_of_poses(bag, 0.25)
         assert source.quality is None
@@ -187,10 +164,9 @@ def test_joints_and_transforms_that_start_again_are_refused_and_named(tmp_path):
         assert np.allclose(read.positions_m, tip_poses(sweep())[0], atol=1e-9)
 
 
-IO = 'cell_msgs/msg/Io'
 TYPES = {
     'cell_msgs/msg/Valve': 'bool open\nfloat64 pressure_bar\nstring label\n',
-    IO: 'int32[] states\nfloat64 level\nuint8 word\ncell_msgs/Valve[2] valves\n',
+    'cell_msgs/msg/Io': 'int32[] states\nfloat64 level\nuint8 word\ncell_msgs/Valve[2] valves\n',
     'cell_msgs/msg/Stamped': 'std_msgs/Header header\nint16 brush\n',
 }
 PASS = straight_pass(triggers=False)
@@ -200,28 +176,19 @@ ON[10:40] = True
 
 
 @pytest.fixture(scope='module')
-def messages():
-    return Messages(state_types=TYPES)
-
-
-def io_message(messages, on: bool):
+def bag(tmp_path_factory):
+    """The pass, and the cell's signals at every pose, logged as the pose is stamped."""
+    messages, entries = Messages(state_types=TYPES), pose_entries(PASS)
     types = messages.store.types
     valve = types['cell_msgs/msg/Valve']
-    return types[IO](
-        np.array([7, 0, 3, 5 if on else 0], np.int32), 23.8 if on else 0.4, 1 if on else 0,
-        [valve(False, 0.0, 'off'), valve(on, 3.1 if on else np.nan, 'needle')],
-    )  # fmt: skip
-
-
-@pytest.fixture(scope='module')
-def bag(messages, tmp_path_factory):
-    """The pass, and the cell's signals at every pose, logged as the pose is stamped."""
-    types = messages.store.types
-    entries = pose_entries(PASS)
     for stamp, on in zip(PASS.stamps_ns.tolist(), ON.tolist(), strict=True):
+        io = types['cell_msgs/msg/Io'](
+            np.array([7, 0, 3, 5 if on else 0], np.int32), 23.8 if on else 0.4, 1 if on else 0,
+            [valve(False, 0.0, 'off'), valve(on, 3.1 if on else np.nan, 'needle')],
+        )  # fmt: skip
         brush = types['cell_msgs/msg/Stamped'](messages.header(stamp), 2 if on else 0)
         entries += [
-            ('/io', stamp, io_message(messages, on)),
+            ('/io', stamp, io),
             ('/brush', stamp + 7_000_000_000, brush),
             ('/valve/pressure', stamp, types['std_msgs/msg/Float64'](3.0 if on else 0.0)),
             ('/closed', stamp, types['std_msgs/msg/Int32'](0 if on else 1)),
@@ -229,12 +196,6 @@ def bag(messages, tmp_path_factory):
         ]
     folder = tmp_path_factory.mktemp('cell') / 'run'
     return write_bag(folder, entries, 'sqlite3', messages)
-
-
-def openings(trajectory) -> np.ndarray:
-    """The flow at each pose."""
-    rows = np.searchsorted(trajectory.trigger_stamps_ns, PASS.stamps_ns, side='right') - 1
-    return trajectory.trigger_flow[rows] > 0.0
 
 
 @pytest.mark.parametrize(
@@ -250,7 +211,8 @@ def openings(trajectory) -> np.ndarray:
 )
 def test_a_number_in_any_field_opens_the_gun(trigger, said, bag):
     read = read_recording(bag, None, trigger)
-    assert np.array_equal(openings(read), ON)
+    rows = np.searchsorted(read.trigger_stamps_ns, PASS.stamps_ns, side='right') - 1
+    assert np.array_equal(read.trigger_flow[rows] > 0.0, ON)
     (note,) = read.notes
     assert said in note
 
@@ -259,22 +221,6 @@ def test_values_that_are_no_number_are_left_out_and_counted(bag):
     read = read_recording(bag, state_topic='/io.valves[1].pressure_bar')
     assert len(read.trigger_flow) == ON.sum()
     assert '20 values that are no number are left out' in read.notes[0]
-
-
-@pytest.mark.parametrize(
-    ('trigger', 'words'),
-    [
-        ('/io', 'is cell_msgs/msg/Io; name one of its fields: /io.states[0] /io.states[1]'),
-        ('/io.state[3]', "no number or Bool at .state[3]; did you mean '/io.states[3]'?"),
-        ('/io.valves[1].label', 'no number or Bool at .valves[1].label'),
-        ('/oi.word', 'has no topic /oi.word'),
-        ('/io.level > 1e', "'1e' is no number"),
-    ],
-)
-def test_a_field_that_is_not_there_is_refused_with_those_there_are(trigger, words, bag):
-    with pytest.raises(RecordingError) as refused:
-        read_recording(bag, state_topic=trigger)
-    assert words in str(refused.value)
 
 
 def test_the_run_of_a_part_keeps_the_order_in_which_its_states_came(tmp_path):
@@ -289,7 +235,6 @@ def test_the_run_of_a_part_keeps_the_order_in_which_its_states_came(tmp_path):
 
 
 BELL = [0.0, 0.02, 0.31, *Rotation.from_euler('y', 0.3).as_quat()]
-RAIL = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]
 
 
 def tf_bag(path, storage='mcap'):
@@ -300,42 +245,58 @@ def tf_bag(path, storage='mcap'):
     entries = [('/tf_static', stamps[0], messages.transforms((0, 'tool0', 'bell', BELL)))]
     for row, stamp in enumerate(stamps.tolist()):
         pose = (stamp, 'rail', '/tool0', [*positions[row], *quaternions[row]])
-        rail = (stamp, 'world', 'rail', [0.1 * TIMES_S[row], *RAIL[1:]])
+        rail = (stamp, 'world', 'rail', [0.1 * TIMES_S[row], 0, 0.1, 0, 0, 0, 1])
         rows = [pose, rail] if row % 10 == 0 else [pose]
         entries.append(('/tf', stamp, messages.transforms(*rows)))
     return write_bag(path, entries, storage, messages)
 
 
-def expected_poses():
-    """Of the bell in the world."""
+def test_the_bell_in_the_world_is_the_product_along_the_tree(tmp_path):
+    bag = tf_bag(tmp_path / 'run.bag', 'ros1')
+    read = read_recording(bag, tf=['world', 'bell'], frame_id='world')
     positions, quaternions = tip_poses(sweep())
     bell, turn = Rigid.of(BELL), Rotation.from_quat(quaternions)
     at = positions + turn.apply(bell.translation_m) + [0, 0, 0.1]
     at[:, 0] += 0.1 * TIMES_S
-    return at, (turn * Rotation.from_quat(bell.quaternion_xyzw)).as_quat()
-
-
-def test_the_bell_in_the_world_is_the_product_along_the_tree(tmp_path):
-    bag = tf_bag(tmp_path / 'run.bag', 'ros1')
-    read = read_recording(bag, tf=['world', 'bell'], frame_id='world')
-    positions, quaternions = expected_poses()
     assert np.array_equal(read.stamps_ns, stamps_ns(TIMES_S))
-    assert np.allclose(read.positions_m, positions, atol=1e-6)
-    apart = Rotation.from_quat(quaternions).inv() * Rotation.from_quat(read.quaternions_xyzw)
+    assert np.allclose(read.positions_m, at, atol=1e-6)
+    turned = turn * Rotation.from_quat(bell.quaternion_xyzw)
+    apart = turned.inv() * Rotation.from_quat(read.quaternions_xyzw)
     assert apart.magnitude().max() < 1e-6
     (note,) = read.notes
     assert "pose of 'bell' in 'world', 151 poses" in note
     assert 'interpolated over up to 0.2 s' in note
 
 
-@pytest.mark.parametrize(
-    ('frames', 'words'),
-    [
-        (['world', 'bel'], "no frame 'bel' in its transforms; did you mean 'bell'?"),
-        (['tool0', 'bell'], "'bell' does not move in 'tool0'"),
+MISSING = {
+    'joints': [
+        ({}, 'name a pose topic; it has no PoseStamped topic; it has joint states (give urdf)'),
+        ({'urdf': str(URDF), 'tip_link': 'tool1'}, "has no link 'tool1'; did you mean 'tool0'?"),
+        ({'urdf': str(URDF), 'base_link': 'tool0', 'tip_link': 'base_link'}, 'does not hang on'),
+        ({'urdf': str(URDF), 'tf': ['a', 'b']}, 'leave one of them out'),
+        ({'urdf': str(URDF), 'pose_topic': '/joints'}, 'no topic /joints; its JointState topics'),
+        ({'urdf': str(URDF), 'frame_id': 'door'}, "in frame 'base_link', the mesh in 'door'"),
     ],
-)
-def test_frames_that_are_not_there_or_do_not_move_are_refused(frames, words, tmp_path):
-    with pytest.raises(RecordingError) as refused:
-        read_recording(tf_bag(tmp_path / 'run'), tf=frames)
-    assert words in str(refused.value)
+    'signals': [
+        ({'state_topic': '/io'},
+         'is cell_msgs/msg/Io; name one of its fields: /io.states[0] /io.states[1]'),
+        ({'state_topic': '/io.state[3]'},
+         "no number or Bool at .state[3]; did you mean '/io.states[3]'?"),
+        ({'state_topic': '/io.valves[1].label'}, 'no number or Bool at .valves[1].label'),
+        ({'state_topic': '/oi.word'}, 'has no topic /oi.word'),
+        ({'state_topic': '/io.level > 1e'}, "'1e' is no number"),
+    ],
+    'frames': [
+        ({'tf': ['world', 'bel']}, "no frame 'bel' in its transforms; did you mean 'bell'?"),
+        ({'tf': ['tool0', 'bell']}, "'bell' does not move in 'tool0'"),
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('kind', MISSING)
+def test_what_is_not_in_a_bag_is_refused_with_what_there_is(kind, bag, tmp_path):
+    path = tmp_path / 'run'
+    if kind != 'signals':
+        bag = joint_bag(path, rows_of()[:3]) if kind == 'joints' else tf_bag(path)
+    for given, words in MISSING[kind]:
+        assert words in refusal(RecordingError, read_recording, bag, **given)

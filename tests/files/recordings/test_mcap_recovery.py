@@ -44,9 +44,9 @@ def test_whole_recordings_of_others_come_back_whole(tmp_path, shared_data, name)
     assert (lost['breaks'], lost['damaged_chunks']) == ([], 0)
 
 
-@pytest.fixture
-def cut_run(tmp_path):
-    """A run cut in the middle of its third chunk or later; its custom data and QoS are special."""
+@pytest.mark.parametrize('given', ['folder', 'file'])
+def test_a_cut_run_becomes_a_whole_one(tmp_path, given):
+    """Cut in the middle of its third chunk or later; its custom data and QoS are special."""
     with RunWriter(tmp_path / 'run', {'mesh': 'door.stl'}, ros_distro='jazzy') as writer:
         weak = offered_qos(7)._replace(reliability=QosReliability.BEST_EFFORT)
         qos = [offered_qos(1, latched=True), weak]
@@ -58,12 +58,7 @@ def cut_run(tmp_path):
     content = writer.path.read_bytes()
     writer.path.write_bytes(content[: int(0.6 * len(content))])
     (writer.folder / 'metadata.yaml').unlink()
-    return writer.folder
-
-
-@pytest.mark.parametrize('given', ['folder', 'file'])
-def test_a_cut_run_becomes_a_whole_one(tmp_path, cut_run, given):
-    source = cut_run if given == 'folder' else cut_run / 'run_0.mcap'
+    source = writer.folder if given == 'folder' else writer.path
     recovery, lost = recover(source, tmp_path / 'recovered')
     assert 3_000 < recovery.message_count < 9_000
     assert recovery.counts == {'/gun': recovery.message_count}
@@ -81,12 +76,9 @@ def test_a_cut_run_becomes_a_whole_one(tmp_path, cut_run, given):
     assert metadata['type_description_hash'] == standard(BOOL)[1]
 
 
-NESTED = '{a: ' * 600 + '1' + '}' * 600
-
-
-@pytest.mark.parametrize(
-    'told', ['a: 2024-13-45', NESTED, 'custom_data: [1]', 'a: &a [*a]', '- 1']
-)
+@pytest.mark.parametrize('told', [
+    'a: 2024-13-45', '{a: ' * 600 + '1' + '}' * 600, 'custom_data: [1]', 'a: &a [*a]', '- 1',
+])  # fmt: skip
 def test_odd_metadata_in_a_file_do_not_keep_it_from_being_recovered(tmp_path, told):
     with RunWriter(tmp_path / 'run') as run:
         run.add_topic('/gun', BOOL, standard(BOOL))

@@ -1,9 +1,10 @@
 """Runs in the MCAP layout of rosbag2, and the definitions of their messages."""
 
-import os
-import signal
-import subprocess
-import sys
+import contextlib
+import itertools
+import resource
+import time
+from multiprocessing import get_context
 
 import pytest
 import yaml
@@ -18,6 +19,7 @@ from paint_deposition.files.recordings.mcap_run import RunWriter, offered_qos
 from paint_deposition.files.recordings.messages import standard
 
 BOOL = 'std_msgs/msg/Bool'
+FORK = get_context('fork')
 TRUE_CDR, FALSE_CDR = b'\0\1\0\0\1', b'\0\1\0\0\0'
 QOS_KEYS = {
     'history', 'depth', 'reliability', 'durability', 'deadline', 'lifespan', 'liveliness',
@@ -82,37 +84,31 @@ def test_metadata_and_records_of_a_run(run):
         ]  # fmt: skip
 
 
-WRITE_UNTIL_KILLED = """
-import sys, time
-from pathlib import Path
-from paint_deposition.files.recordings.mcap_run import RunWriter
-sys.path.insert(0, sys.argv[2])
-from files.recordings.test_mcap_run import TRUE_CDR, gun_topic
-
-writer = RunWriter(sys.argv[1])
-writer.add_topic(*gun_topic())
-start_s = time.monotonic()
-number = 0
-while True:
-    number += 1
-    written_ns = time.monotonic_ns()
-    writer.write('/gun', TRUE_CDR, number, written_ns)
-    print(written_ns, flush=True)
-    while time.monotonic() < start_s + number / 250:
-        time.sleep(0.0005)
-"""
+def write_until_killed(folder, told) -> None:
+    """At 250 Hz; tells when each was written [ns]."""
+    writer = RunWriter(folder)
+    writer.add_topic(*gun_topic())
+    start_s = time.monotonic()
+    for number in itertools.count(1):
+        written_ns = time.monotonic_ns()
+        writer.write('/gun', TRUE_CDR, number, written_ns)
+        told.send(written_ns)
+        while time.monotonic() < start_s + number / 250:
+            time.sleep(0.0005)
 
 
 @pytest.mark.slow
-def test_a_killed_process_loses_less_than_a_second(tmp_path, repository):
-    run, tests = tmp_path / 'run', repository / 'tests'
-    command = [sys.executable, '-c', WRITE_UNTIL_KILLED, run, tests]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE)
-    written_ns = [int(process.stdout.readline()) for _ in range(400)]
-    os.kill(process.pid, signal.SIGKILL)
-    written_ns += map(int, process.stdout.read().split())
-    process.wait()
-    recovery, _ = recover(run, tmp_path / 'recovered')
+def test_a_killed_process_loses_less_than_a_second(tmp_path):
+    told, tells = FORK.Pipe(duplex=False)
+    process = FORK.Process(target=write_until_killed, args=(tmp_path / 'run', tells))
+    process.start()
+    tells.close()
+    written_ns = [told.recv() for _ in range(400)]
+    process.kill()
+    with contextlib.suppress(EOFError):
+        while True:
+            written_ns.append(told.recv())
+    recovery, _ = recover(tmp_path / 'run', tmp_path / 'recovered')
     lost_ns = written_ns[recovery.message_count :]
     # By the writer's own clock: a busy machine may keep it waiting between two messages.
     assert not lost_ns or lost_ns[-1] - lost_ns[0] < 1_000_000_000
@@ -120,46 +116,37 @@ def test_a_killed_process_loses_less_than_a_second(tmp_path, repository):
         assert [t for _, t, _ in reader.messages()] == list(range(1, recovery.message_count + 1))
 
 
-WRITE_UNTIL_REFUSED = """
-import resource, sys
-sys.path.insert(0, sys.argv[2])
-from files.recordings.test_mcap_run import TRUE_CDR, gun_topic
-from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings.mcap_run import RunWriter
-
-resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
-with RunWriter(sys.argv[1], compression='none') as writer:
-    writer.add_topic(*gun_topic())
-    number = 0
-    try:
-        while True:
-            writer.write('/gun', TRUE_CDR, number, number)
-            number += 1
-    except RecordingError as error:
-        first = str(error)
+def write_until_refused(folder, tells) -> None:
+    """Tells how many were written, and the errors of the first refusal and of the next."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+    with RunWriter(folder, compression='none') as writer:
+        writer.add_topic(*gun_topic())
         try:
-            writer.write('/gun', TRUE_CDR, number, number)
-        except RecordingError as again:
-            print(number, first == str(again), first, sep='|')
-        raise
-"""
+            for number in itertools.count():
+                writer.write('/gun', TRUE_CDR, number, number)
+        except RecordingError as error:
+            with pytest.raises(RecordingError) as again:
+                writer.write('/gun', TRUE_CDR, number, number)
+            tells.send((number, str(error), str(again.value)))
+            raise
 
 
 @pytest.mark.slow
-def test_the_first_refused_write_is_the_last(tmp_path, repository):
+def test_the_first_refused_write_is_the_last(tmp_path):
     """A limit on the file's size fails exactly as a full disk: some bytes, then an error."""
-    run = tmp_path / 'run'
-    command = [sys.executable, '-c', WRITE_UNTIL_REFUSED, run, repository / 'tests']
-    process = subprocess.run(command, capture_output=True, text=True, check=False)
-    number, same, message = process.stdout.strip().split('|')
-    assert process.returncode != 0
-    assert same == 'True'
+    run, (told, tells) = tmp_path / 'run', FORK.Pipe(duplex=False)
+    process = FORK.Process(target=write_until_refused, args=(run, tells))
+    process.start()
+    number, message, again = told.recv()
+    process.join()
+    assert process.exitcode == 1
+    assert again == message
     assert 'is incomplete after' in message
     assert f'paint recover {run}' in message
     assert not (run / 'metadata.yaml').exists()
     recovery, _ = recover(run, tmp_path / 'recovered')
     # What the failing chunk held is lost: 64 KiB of messages of 36 bytes.
-    assert 0 <= int(number) - recovery.message_count <= 64 * 1024 / 36 + 1
+    assert 0 <= number - recovery.message_count <= 64 * 1024 / 36 + 1
 
 
 def test_text_is_what_rosbag2_wrote(shared_data):

@@ -16,7 +16,6 @@ from paint_deposition.files.tables.reading_columns import Layout
 from workbook import write_workbook
 
 LAYOUTS = Path(__file__).with_name('layouts')
-FILMS_UM = [21.5, 22.5, 24.0, 19.5]
 MERGED = [
     ['Messpunkt', 'Koordinaten [mm]', None, None, 'Schichtdicke [µm]', None],
     [None, 'X', 'Y', 'Z', 'Ist', 'Soll'],
@@ -53,7 +52,7 @@ def points(tmp_path):
 @pytest.mark.parametrize('name', CASES)
 def test_a_layout_is_read_as_it_is_written(name, tmp_path, points):
     name, *expected = CASES[name]
-    films, labels = expected or (' '.join(map(str, FILMS_UM)), 'P1 P2 P3 P4')
+    films, labels = expected or ('21.5 22.5 24.0 19.5', 'P1 P2 P3 P4')
     path = LAYOUTS / name
     if name == 'merged.xlsx':
         path, points = write_workbook(tmp_path / name, {'Messung': MERGED}), None
@@ -133,14 +132,12 @@ def test_a_folder_with_several_tables_is_refused(tmp_path):
         read_readings(tmp_path)
 
 
-POINTS_M = np.array([[0.1, 0.0, 0.05], [0.1, 0.0, 0.2], [0.25, 0.0, 0.35]])
-
-
 def require_the_four_readings(readings, within_um=1e-9):
     """All layouts hold the same four readings at the same three points."""
     assert readings.thickness_um == pytest.approx([21.5, 22.1, 24.0, 19.4], abs=within_um)
     assert readings.point.tolist() == ['A1', 'A1', 'A2', 'A3']
-    assert readings.positions_m == pytest.approx(POINTS_M[[0, 0, 1, 2]], abs=1e-12)
+    points_m = np.array([[0.1, 0.0, 0.05], [0.1, 0.0, 0.2], [0.25, 0.0, 0.35]])
+    assert readings.positions_m == pytest.approx(points_m[[0, 0, 1, 2]], abs=1e-12)
 
 
 # Files in `layouts/`, and what is said of each: a unit in a column of its own and statistics

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_gun_motions, read_recording
 from paint_deposition.request import MotionOptions
+from refusals import refusal
 from robot_arm import URDF
 from workbook import write_workbook
 
@@ -21,8 +22,6 @@ TURNS = Rotation.from_euler(
 )
 ON = [0, 1, 1, 0, 0]
 HEAD = 't,x,y,z,qx,qy,qz,qw'
-
-
 # What must be said to read a file of `poses/`, each of which has the motion in another layout.
 LAYOUTS = Path(__file__).with_name('poses')
 SAID = {
@@ -175,10 +174,9 @@ PASSES = 'x,y,z,qx,qy,qz,qw,speed\n0,0,0,0,0,0,1,1\n'
 )
 def test_what_cannot_be_read_for_certain_is_refused(text, words, file):
     path = file('poses.csv', text)
-    with pytest.raises(RecordingError) as refused:
-        read_recording(path)
-    assert str(path) in str(refused.value)
-    assert words in str(refused.value)
+    line = refusal(RecordingError, read_recording, path)
+    assert str(path) in line
+    assert words in line
 
 
 @pytest.mark.parametrize(('suffix', 'rotation'), [('.src', 'kuka'), ('.LS', 'fanuc')])

@@ -30,11 +30,11 @@ def publisher(cell, wait_until):
 
 @pytest.fixture
 def listen(ros_context, spin):
-    """`listen(name)`: a node that hears the poses, running."""
+    """`listen(reports=True)`: a node that hears the poses, running."""
     from nodes.bags.runs import Listener
 
-    def listen(name='listener', reports=True, namespace='') -> Listener:
-        listener = Listener(ros_context, name, reports, namespace)
+    def listen(reports=True) -> Listener:
+        listener = Listener(ros_context, reports)
         spin(listener)
         return listener
 

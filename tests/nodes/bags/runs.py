@@ -50,8 +50,8 @@ def messages(path) -> list[tuple[str, bytes]]:
 class Listener(Node):
     """Takes poses and states as they come, as bytes, and may report progress."""
 
-    def __init__(self, context, name='listener', reports=False, namespace=''):
-        super().__init__(name, context=context, namespace=namespace)
+    def __init__(self, context, reports):
+        super().__init__('listener', context=context)
         self.poses: list[bytes] = []
         self.states: list[AtomizerState] = []
         whole, take = QoSProfile(depth=5_000), self.poses.append

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import trimesh
 
+from booth import centroid_m
 from nodes.cell import offline_um, turned, two_passes
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -40,12 +41,6 @@ rclpy.spin(node)
 """
 
 
-def centroid_m(node, film_um):
-    """(3,) where the paint is [m]."""
-    volume = film_um * node.surface.vertex_areas_m2
-    return volume @ node.surface.vertices_m / volume.sum()
-
-
 def test_the_gun_decides_which_side_of_a_solid_is_outward(simulator, robot, painted, tmp_path):
     """A plate of 12 mm that is painted on +x: booth air to the gun's right blows to +y."""
     aside_m = 0.06
@@ -57,7 +52,8 @@ def test_the_gun_decides_which_side_of_a_solid_is_outward(simulator, robot, pain
     still = simulator(mesh_file=str(plate))
     node = simulator(mesh_file=str(plate), model_file=str(tmp_path / 'air.yaml'))
     robot(still, node).send(motion)
-    moved = centroid_m(node, painted(node)) - centroid_m(still, painted(still))
+    lies, lay = (centroid_m(painted(one), one.surface.points()) for one in (node, still))
+    moved = lies - lay
     assert moved[1] > 0.2 * aside_m
     path, _ = spray_path(motion)
     motions = [(path.position_m, path.rotation[:, :, 2])]

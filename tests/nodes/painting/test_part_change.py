@@ -4,6 +4,7 @@ import json
 import shutil
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -42,27 +43,15 @@ def later(motion: pd.Trajectory) -> pd.Trajectory:
 
 
 @pytest.fixture
-def asked(onlooker, wait_until):
-    """`asked(**fields)`: the future of the simulator's answer, whoever spins."""
-    client = onlooker().create_client(ChangePart, '/deposition_simulator/change_part')
-
-    def asked(**fields):
-        wait_until(client.service_is_ready)
-        return client.call_async(ChangePart.Request(**fields))
-
-    return asked
+def begin(onlooker, asked):
+    """`begin(**fields)`: the future of the simulator's answer, whoever spins."""
+    return partial(asked, onlooker(), ChangePart, '/deposition_simulator/change_part')
 
 
 @pytest.fixture
-def change(asked, wait_until):
+def change(onlooker, call):
     """`change(**fields)`: the answer of the simulator."""
-
-    def change(**fields) -> ChangePart.Response:
-        future = asked(**fields)
-        wait_until(future.done, what='the change')
-        return future.result()
-
-    return change
+    return partial(call, onlooker(), ChangePart, '/deposition_simulator/change_part')
 
 
 @pytest.fixture
@@ -252,15 +241,15 @@ def test_a_film_is_kept_until_it_is_on_disk(simulated, painted, change, tmp_path
 
 
 @pytest.mark.parametrize(('pose', 'frame'), [([], 'part'), ([0.0] * 6 + [1.0], 'cell')])
-def test_a_change_that_fails_is_none(simulated, painted, asked, wait_until, tmp_path, pose, frame):
+def test_a_change_that_fails_is_none(simulated, painted, begin, wait_until, tmp_path, pose, frame):
     """Pose and poses that came meanwhile are left to the old part."""
     node, source = simulated(part_pose=pose, part_parent_frame='cell')
     large, broken = write_panel(tmp_path / 'large.stl', scale=8.0), tmp_path / 'broken.stl'
     broken.write_text('no mesh')
     # The broken mesh is looked at after the large one.
-    asked(prepare=True, mesh_file=str(large))
+    begin(prepare=True, mesh_file=str(large))
     aside = [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
-    future = asked(serial='1', mesh_file=str(broken), part_pose=aside)
+    future = begin(serial='1', mesh_file=str(broken), part_pose=aside)
     wait_until(lambda: node.parts.waiting, what='the request')
     for step in (node.trigger_deactivate, node.trigger_cleanup):
         assert step() != TransitionCallbackReturn.SUCCESS
@@ -277,7 +266,7 @@ def test_a_change_that_fails_is_none(simulated, painted, asked, wait_until, tmp_
 
 
 def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
-    simulator, robot, painted, change, asked, record, wider, wait_until, tmp_path
+    simulator, robot, painted, change, begin, record, wider, wait_until, tmp_path
 ):
     """Two states are sent early, the robot's clock is ahead, the part between has no poses."""
     ahead_ns = time.time_ns() + 60 * LATER_NS - WITHOUT_TRIGGER.stamps_ns[0]
@@ -292,7 +281,7 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
     film = painted(node, half)
     before = SimpleNamespace(points=node.points, surface=node.surface)
     assert change(serial='0').success
-    future = asked(serial='1', mesh_file=wider, part_pose=[0.0] * 6 + [1.0])
+    future = begin(serial='1', mesh_file=wider, part_pose=[0.0] * 6 + [1.0])
     wait_until(lambda: node.parts.waiting, what='the request')
     source.send(moved, slice(half, None), frame_id='cell')
     wait_until(future.done, what='the change')
@@ -325,7 +314,7 @@ def test_a_pose_during_a_reset_is_of_the_run_that_begins(simulated, painted, cha
 
 
 @pytest.mark.parametrize('placed', [True, False])
-def test_poses_that_wait_are_of_their_part(simulator, robot, painted, asked, wait_until, placed):
+def test_poses_that_wait_are_of_their_part(simulator, robot, painted, begin, wait_until, placed):
     """The change waits for them; without a transform they are refused on their own part."""
     node = simulator()
     # A cell in which transforms may come.
@@ -334,7 +323,7 @@ def test_poses_that_wait_are_of_their_part(simulator, robot, painted, asked, wai
     source = robot(node)
     source.send(MOTION, frame_id='cell')
     wait_until(lambda: len(node.inputs[0].tf_queue) == len(MOTION), what='poses that wait')
-    future = asked(serial='1')
+    future = begin(serial='1')
     wait_until(lambda: node.parts.waiting, what='the request')
     source.send(later(MOTION))
     if placed:

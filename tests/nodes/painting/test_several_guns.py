@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import paint_deposition as pd
-from nodes.cell import Robot, offline_um, turned, two_passes
-from paint_deposition.effects.library.sag import Sag
+from nodes.cell import offline_um, turned, two_passes
 from paint_deposition.files.motion_files import read_gun_motions
 from paint_deposition.request import MotionOptions
 
@@ -24,16 +23,9 @@ THIN = pd.DepositionModel(planar={'K1_cm3_per_s': 1.0})
 
 
 @pytest.fixture
-def guns(ros_context, spin, wait_until):
+def guns(robot):
     """`guns(node)`: a robot for each of GUNS, heard by the node."""
-
-    def guns(node) -> list[Robot]:
-        robots = [Robot(ros_context, namespace=name) for name in GUNS]
-        spin(*robots)
-        wait_until(lambda: all(r.is_subscribed_by(node) for r in robots), what='discovery')
-        return robots
-
-    return guns
+    return lambda node: [robot(node, namespace=name) for name in GUNS]
 
 
 def test_each_guns_share_is_reported(simulator, guns, painted, onlooker, wait_until):
@@ -76,25 +68,6 @@ def test_the_first_gun_decides_which_side_is_outward(simulator, guns, painted, w
     painted(node, len(behind) + len(HIGH))
     wait_until(lambda: node.surface.outward[1] < 0.0, what='the part turned to the first gun')
     assert np.array_equal(node.film.snapshot().film_um, offline_um(node, HIGH))
-
-
-def test_what_does_not_go_together_is_refused(simulator, tmp_path):
-    thin, sagging = str(tmp_path / 'thin.yaml'), str(tmp_path / 'sagging.yaml')
-    pd.write_model(tmp_path / 'thin.yaml', THIN)
-    pd.write_model(tmp_path / 'sagging.yaml', THIN.with_effect(Sag.typical()))
-    one_film = r'robot_1 and robot_2 differ in what acts on the finished film.*\(sag\)'
-    for values, words in (
-        ({'model_files': [thin]}, 'model_files names 1 models for 2 atomizers: give'),
-        (
-            {'model_files': [thin, thin], 'model_file': thin},
-            'atomizers and model_file another: give model_file',
-        ),
-        ({'model_files': [thin, sagging]}, one_film),
-        ({'atomizers': ['robot_1', 'robot_1']}, r'atomizers is .*give different names'),
-        ({'atomizers': ['../robot']}, r'atomizers is .*give different names'),
-    ):
-        with pytest.raises(pd.PaintError, match=words):
-            simulator(**{'atomizers': GUNS} | values)
 
 
 def test_the_film_is_the_sum_of_guns(simulator, record, guns, wait_until, painted, play, tmp_path):

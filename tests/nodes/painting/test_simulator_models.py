@@ -11,13 +11,13 @@ from brushes import switched, two_brushes
 from nodes.cell import offline_um, parameters, two_passes, write_own_model
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.errors import ModelError
+from refusals import refusal
 
 MOTION = two_passes()
 # One effect that acts on each ray, and one that needs whole strokes.
 MODEL = pd.DepositionModel(
     effects=tuple(effect_class(i).typical() for i in ('incidence_attraction', 'corner_slowdown'))
 )
-THIN = pd.DepositionModel(planar={'K1_cm3_per_s': 0.19})
 BRUSHES = two_brushes()
 POSES = 'deposition_simulator: poses'
 
@@ -94,10 +94,8 @@ def test_a_model_that_a_peer_sets_runs_and_reads_no_file(simulator, tmp_path, tm
     """Files elsewhere are not opened, and a message holds nothing of those that are no models."""
     own = write_own_model(tmp_path)
     (tmp_path / 'own.py').write_text('raise SystemExit("run without leave")')
-    with pytest.raises(ModelError) as refused:
-        simulator(model_file=str(own))
-    refusal = str(refused.value)
-    assert refusal == (
+    refused = refusal(ModelError, simulator, model_file=str(own))
+    assert refused == (
         f'{own}: effect file {tmp_path}/own.py is not run, because it is Python code; if you '
         'trust it, start the node with allow_user_effects:=true'
     )
@@ -106,7 +104,7 @@ def test_a_model_that_a_peer_sets_runs_and_reads_no_file(simulator, tmp_path, tm
     def told(**values) -> str:
         return node.set_parameters_atomically(parameters(**values)).reason
 
-    assert told(model_file=str(own)) == refusal
+    assert told(model_file=str(own)) == refused
     # Nobody who can set parameters can give leave.
     assert told(allow_user_effects=True, model_file=str(own))
     assert not node.get_parameter('allow_user_effects').value
@@ -131,7 +129,7 @@ def test_a_new_model_may_also_paint_from_then_on_only(simulated, painted, wait_u
     node, source = simulated(repaint=False)
     source.send(MOTION, slice(0, 300))
     before = painted(node, 300)
-    set_model(node, THIN)
+    set_model(node, pd.DepositionModel(planar={'K1_cm3_per_s': 0.19}))
     wait_until(lambda: not node.repainting)
     source.send(MOTION, slice(300, None))
     whole = offline_um(node, MOTION)

@@ -10,7 +10,7 @@ from paint_msgs.srv import SaveFilm
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker
 
-from nodes.cell import Robot, offline_um, parameters, two_passes
+from nodes.cell import offline_um, parameters, two_passes
 from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.statistics import FIGURES, film_statistics
 from paint_deposition.report.colour_scales import FILM_PALETTE
@@ -135,11 +135,9 @@ def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulated, onlook
     wait_until(lambda: viewer.reports(POSES, counted, b'\x01'), what='the error gone')
 
 
-def test_two_guns_on_one_topic_are_reported(simulator, ros_context, spin, onlooker, wait_until):
+def test_two_guns_on_one_topic_are_reported(simulator, robot, onlooker, wait_until):
     node, viewer = simulator(), onlooker()
-    guns = [Robot(ros_context), Robot(ros_context)]
-    spin(*guns)
-    wait_until(lambda: all(g.pose_publisher.get_subscription_count() for g in guns))
+    guns = [robot(node), robot(node)]
     for row in range(50):
         for side, gun in zip((0.0, 0.5), guns, strict=True):
             position = MOTION.positions_m[row] + [0.0, 0.0, side]

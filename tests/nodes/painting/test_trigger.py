@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 
-from nodes.cell import Robot, offline_um, two_passes
+from nodes.cell import offline_um, two_passes
 from paint_deposition.nodes.topics import header
 
 POSES = 'deposition_simulator: poses'
@@ -34,15 +34,15 @@ def test_a_state_of_which_only_spraying_is_filled_sprays(simulated, painted, onl
     wait_until(lambda: viewer.reports(POSES, '1 states that spray with flow 0', b'\x01'))
 
 
-def test_a_latched_trigger_counts(simulator, ros_context, spin, wait_until, painted):
+def test_a_latched_trigger_counts(simulator, robot, ros_context, spin, wait_until, painted):
     """The gun was closed before; beside it a robot sends by best effort and keeps nothing."""
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     gun = Node('gun', context=ros_context)
     states = gun.create_publisher(AtomizerState, 'atomizer/state', latched)
     before_ns = int(UNTRIGGERED.stamps_ns[0]) - 60_000_000_000
     states.publish(AtomizerState(header=header('', before_ns)))
-    source = Robot(ros_context, reliable=False)
-    spin(gun, source)
+    source = robot(reliable=False)
+    spin(gun)
     node = simulator()
     wait_until(lambda: source.has_subscribers(1), what='discovery')
     wait_until(lambda: node.film.guns[0].flow == 0.0, what='the latched state')
@@ -72,16 +72,13 @@ def test_what_leaves_the_part_bare_is_reported(simulated, onlooker, wait_until):
     wait_until(lambda: viewer.reports(POSES.replace('poses', 'part'), bare, b'\x01'))
 
 
-def test_robots_are_heard_as_they_send(simulator, ros_context, spin, painted, wait_until, still):
+def test_robots_are_heard_as_they_send(simulator, robot, painted, wait_until, still):
     """A best-effort robot beside a reliable one, of which no pose may be lost for that."""
     node = simulator(pose_queue_depth=5000)
-    first = Robot(ros_context)
-    spin(first)
-    wait_until(lambda: first.is_subscribed_by(node), what='discovery')
+    first = robot(node)
     first.send(UNTRIGGERED, slice(0, 300))
     assert np.ptp(painted(node, 300)) > 0.0
-    second = Robot(ros_context, reliable=False)
-    spin(second)
+    second = robot(reliable=False)
     wait_until(lambda: second.pose_publisher.get_subscription_count(), what='best effort')
     second.send(UNTRIGGERED, slice(300, 310))
     wait_until(lambda: node.film.counts.received > 300, what='poses of best effort')
@@ -104,10 +101,9 @@ def test_robots_are_heard_as_they_send(simulator, ros_context, spin, painted, wa
     assert node.film.counts.rejected == sum(topic.lost for topic in node.inputs[0].topics) == 0
 
 
-def test_no_more_is_asked_for(simulator, ros_context, spin, onlooker, wait_until, capfd):
+def test_no_more_is_asked_for(simulator, robot, onlooker, wait_until, capfd):
     """Of a best-effort robot that is there: neither side reports that the other does not fit."""
-    source = Robot(ros_context, reliable=False)
-    spin(source)
+    source = robot(reliable=False)
     node, viewer = simulator(), onlooker()
     wait_until(lambda: source.is_subscribed_by(node))
     wait_until(lambda: viewer.reports(POSES, 'waiting for poses', b'\x00'))

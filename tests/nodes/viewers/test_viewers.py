@@ -33,9 +33,7 @@ RVIZ = {
 }  # fmt: skip
 
 
-@pytest.fixture
-def publishers(start):
-    """The publishers of all nodes that a viewer looks at, by topic."""
+def test_layouts_show_what_is_published_as_it_is_published(start):
     panel = SAMPLES / 'panel_study'
     part = {'mesh_file': str(panel / 'panel.stl'), 'max_edge_length_m': 0.1}
     readings = {'measurements_file': str(panel / 'panel_577.csv')}
@@ -45,15 +43,8 @@ def publishers(start):
         start(IndexPlanner),
         start(BagPlayer, bag=str(SAMPLES / 'door_horizontal'), start_paused=True),
     ]
-    return {publisher.topic_name: publisher for node in made for publisher in node.publishers}
+    publishers = {each.topic_name: each for node in made for each in node.publishers}
 
-
-def type_of(publisher) -> str:
-    package, kind, _ = publisher.msg_type.__module__.split('.')
-    return f'{package}/{kind}/{publisher.msg_type.__name__}'
-
-
-def test_rviz_shows_what_is_published_as_it_is_published(publishers):
     manager = yaml.safe_load((LAYOUTS / 'paint.rviz').read_text())['Visualization Manager']
     assert manager['Global Options']['Fixed Frame'] == 'part'
     shown = 0
@@ -62,15 +53,14 @@ def test_rviz_shows_what_is_published_as_it_is_published(publishers):
         if kind:
             topic = display['Topic']
             publisher = publishers['/' + topic['Value']]
-            assert type_of(publisher) == kind
+            package, *_ = publisher.msg_type.__module__.split('.')
+            assert f'{package}/msg/{publisher.msg_type.__name__}' == kind
             latched = publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
             assert topic['Durability Policy'] == ('Transient Local' if latched else 'Volatile')
             assert display.get('Channel Name', 'thickness_um') == 'thickness_um'
             shown += 1
     assert shown == 7
 
-
-def test_foxglove_shows_what_is_published(publishers):
     layout = json.loads((LAYOUTS / 'foxglove.json').read_text())
     panels = layout['configById']
     assert set(panels) == set(panels_of(layout['layout']))
