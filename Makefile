@@ -45,8 +45,8 @@ fuzz: build  ## feed changed files to the readers; ARGS='-k rapid' chooses
 reliability: build  ## end the nodes at random moments, 50 times each
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.reliability $(ARGS)
 
-cell: build  ## take 10,000 random steps in a cell: poses, states, parts, kills; ARGS goes to pytest
-	@$(IN_ENVIRONMENT) PAINT_STEPS=$${PAINT_STEPS:-10000} pytest tests/nodes/test_random_cell.py --timeout 0 -o faulthandler_timeout=0 $(ARGS)
+cell: build  ## take 10,000 random steps in a cell, its recordings in runs/cell; ARGS goes to pytest
+	@$(IN_ENVIRONMENT) PAINT_STEPS=$${PAINT_STEPS:-10000} pytest tests/nodes/test_random_cell.py --basetemp runs/cell --timeout 0 -o faulthandler_timeout=0 $(ARGS)
 
 soak: build  ## run a cell for half an hour; ARGS='--minutes 10 --rate 750' for as much in less
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page soak $(ARGS)
