@@ -28,7 +28,7 @@ def kept(results: Path) -> list[dict]:
 def add(results: Path, run: Callable[[tuple], list[dict]], todo: Sequence[tuple]) -> list[dict]:
     """Run tasks as `paint sweep` runs its cases; return all records that the file holds."""
     results.parent.mkdir(parents=True, exist_ok=True)
-    cases = [(repr(task), task, ()) for task in todo]
+    cases = [(repr(task), task, ()) for task in dict.fromkeys(todo)]
     with results.open('a') as file:
         done = finished(run, cases, {}, workers()) if todo else ()
         for _, future in tqdm(done, total=len(cases), mininterval=20):

@@ -235,7 +235,7 @@ class Search:
         )
         trial = replace(start, names=frozenset(effects), fit=fit)
         sizes = best_amplitude_sizes(fit, effects)
-        if any(size > 1.0 for size in sizes.values()):
+        if any(size != 1.0 for size in sizes.values()):
             fit = self.state.fitted_with(
                 [*trial.effects.values()],
                 fit.model,
