@@ -56,6 +56,29 @@ def test_topics_of_other_types_and_without_messages_are_no_candidates(tmp_path):
     assert same(pd.read_recording(tmp_path / 'run'), written)
 
 
+def test_states_come_as_they_were_sent_whichever_topic_was_received_first(tmp_path):
+    """To a recorder that was stopped a state may come before poses that were sent before it."""
+    motion = straight_pass(triggers=False)
+    messages = Messages(state_types={STATE_TYPE: STATE_TEXT})
+    stamps = motion.stamps_ns.tolist()
+    with RunWriter(tmp_path / 'run', {'serial': '1'}) as run:
+        for topic, kind in ('/p', POSE), ('/s', STATE_TYPE):
+            run.add_topic(topic, kind, standard(kind))
+
+        def state(row, flow):
+            of = messages.store.types[STATE_TYPE]
+            return of(messages.header(stamps[row]), flow > 0.0, flow, 0.0, 0.0, 0.0, 0, 0.0, 0.0)
+
+        def write(topic, message, sent_ns, logged_ns):
+            run.write(topic, bytes(messages.serialised(message)), logged_ns, sent_ns)
+
+        write('/s', state(0, 1.0), stamps[0] - 1, stamps[0] - 1)
+        write('/s', state(10, 0.0), stamps[30] - 1, stamps[-1])
+        for row, (topic, sent_ns, pose) in enumerate(pose_entries(motion, '/p')):
+            write(topic, pose, sent_ns, sent_ns if row < 20 else stamps[-1] + row)
+    assert pd.read_recording(tmp_path / 'run', None, '/s').trigger_rows.tolist() == [0, 30]
+
+
 def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     written, messages = straight_pass(triggers=False), Messages()
     entries = pose_entries(written, delay_ns=3_000_000)

@@ -21,6 +21,7 @@ from typing import Any, BinaryIO, NamedTuple
 import lz4.frame
 import yaml
 import zstandard
+from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC
 from rosbags.interfaces import MessageDefinitionFormat, Nodetype
 from rosbags.rosbag1 import Reader as Ros1Reader
@@ -143,6 +144,15 @@ class Bag:
         with _read_errors(self.path):
             for topic, type_, log_time_ns, cdr in self.messages(topics):
                 yield topic, log_time_ns, self._types(topic).deserialize_cdr(cdr, type_)
+
+    def sent_ns(self, topics: Sequence[str]) -> dict[int, int]:
+        """When messages of these topics were sent by when they were logged; empty if not known."""
+        sent: dict[int, int] = {}
+        for file in [] if self._is_ros1 else mcap_files(self.path):
+            with _read_errors(self.path), file.open('rb') as stream:
+                read = make_reader(stream).iter_messages(topics)
+                sent |= {message.log_time: message.publish_time for *_, message in read}
+        return sent
 
     def _types(self, topic: str) -> Typestore:
         """The types of a topic's messages; headers of ROS 1 as in ROS 2, without `seq`."""

@@ -19,7 +19,7 @@ from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
 from paint_deposition.files.recordings.mcap_run import RunWriter, offered_qos
 from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, Signal, stamp_ns
-from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses, read_tf_poses
+from paint_deposition.files.recordings.pose_topics import POSE_TYPE, POSES, read_poses, read_tf_poses
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
@@ -145,10 +145,15 @@ def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarr
         )
     rows: np.ndarray = np.empty(0, np.int64)
     # Where the clock was set back, the order in which they came says of which stream they are; in
-    # the run of a part it says so as it did to the simulator.
+    # the run of a part it says so as it did to the simulator, which takes them as they were sent.
     if 'serial' in bag.custom_data or np.any(np.diff(motion.stamps_ns) < 0):
-        logged = np.array([change[3] for change in changes], np.int64)
-        rows = np.searchsorted(np.maximum.accumulate(log_times_ns), logged)
+        sent = bag.sent_ns([each.name for each in (*bag.topics_of(*POSES), topic)])
+        changes.sort(key=lambda change: sent.get(change[3], change[3]))
+        came, told = (
+            np.array([sent.get(logged, logged) for logged in times], np.int64)
+            for times in (log_times_ns.tolist(), [change[3] for change in changes])
+        )
+        rows = np.searchsorted(np.maximum.accumulate(came), told)
     else:
         changes.sort(key=lambda change: change[0])
     return replace(
