@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import trimesh
+from geometry_msgs.msg import PoseStamped
 
 from booth import centroid_m
 from nodes.cell import offline_um, turned, two_passes
@@ -16,7 +17,7 @@ from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.painting.film_display import ACKNOWLEDGE_TIMEOUT_S
-from paint_deposition.nodes.topics import header_stamp_ns
+from paint_deposition.nodes.topics import AdaptiveSubscription, header_stamp_ns
 from paint_deposition.part.surface import toward_the_guns
 
 MOTION = two_passes()
@@ -105,6 +106,22 @@ def test_a_listener_that_stalls_gets_no_queue(simulated, painted, onlooker, wait
             return np.array(other.newest('thickness/field').thickness_um, np.float32)
 
         wait_until(lambda: np.array_equal(newest(), film), what='the newest film')
+
+
+def test_who_sends_faster_than_it_takes_does_not_hold_the_node(simulator, robot):
+    node = simulator()
+    sender, taken = robot(node), []
+
+    def take(message, _):
+        taken.append(message)
+        sender.pose_publisher.publish(message)
+
+    topic = AdaptiveSubscription(node, PoseStamped, 'atomizer/pose', take, depth=10)
+    until_s = time.monotonic() + 30.0
+    while not taken and time.monotonic() < until_s:
+        sender.pose_publisher.publish(PoseStamped())
+        topic.take_pending()
+    assert 1 <= len(taken) <= 10
 
 
 def test_no_pose_is_left_out_while_it_activates_itself(

@@ -108,7 +108,7 @@ class AdaptiveSubscription:
         self.match_qos()
 
     def take_pending(self) -> None:
-        """Take all messages in the queues."""
+        """Take the messages that wait in the queues."""
         if self._polled and time.monotonic() - self._matched_s > 0.1:
             self.match_qos()
         for quality in sorted(self._subscriptions):
@@ -160,7 +160,10 @@ class AdaptiveSubscription:
     def _drain(self, quality: Quality) -> None:
         handle = self._subscriptions[quality].handle
         with handle:
-            while taken := handle.take_message(self._message, self._raw):
+            # No more than what waits: whoever sends faster than this takes would hold the node.
+            for _ in range(self._depth):
+                if (taken := handle.take_message(self._message, self._raw)) is None:
+                    break
                 self._on_message(quality, *taken)
 
     def _on_message(self, heard_by: Quality, message: Any, info: Mapping[str, Any]) -> None:
