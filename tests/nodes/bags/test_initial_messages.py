@@ -2,13 +2,14 @@
 
 from math import inf
 
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from paint_msgs.msg import AtomizerState, Part
 from rclpy.serialization import deserialize_message, serialize_message
 
 from files.recorded import TF, Messages
 from nodes.cell import START_NS
 from paint_deposition.files.recordings.messages import stamp_ns
+from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.bags.initial_messages import InitialMessages
 from paint_deposition.nodes.topics import header, state_message
 
@@ -61,6 +62,24 @@ def test_a_run_begins_with_what_its_part_carries_over_and_what_was_sent_since():
         (START_NS + 3 * S, False, 0.0, 0),
     ]  # fmt: skip
     assert states[0].voltage_kv == 60.0
+
+
+def test_a_run_begins_with_where_its_part_stands_whether_or_not_that_was_heard():
+    """What the simulator says of it after the part may get lost, and come when the run is over."""
+    place, placed = [0.1, 0.0, 0.05, 0.0, 0.0, 0.6, 0.8], []
+    memory = remembered(('/part_pose', b'of the part before', S, S))
+    for heard in [], [('/part_pose', b'of this part', 4 * S, 4 * S)]:
+        for message in heard:
+            memory.add(*message)
+        part = Part(part_pose=place, part_parent_frame='cell', header=header('part', START_NS))
+        memory.begin_part(part, 3 * S)
+        first, *others = memory.begin_run(5 * S)
+        assert [message.cdr for message in others] == [message[1] for message in heard]
+        placed.append(deserialize_message(first.cdr, TransformStamped))
+    for told in placed:
+        t, q = told.transform.translation, told.transform.rotation
+        assert (told.header.frame_id, told.child_frame_id) == ('cell', 'part')
+        assert [t.x, t.y, t.z, q.x, q.y, q.z, q.w] == list(Rigid.of(place).values)
 
 
 def test_without_a_part_a_run_begins_with_the_states_in_force_at_the_last_pose_before_it():

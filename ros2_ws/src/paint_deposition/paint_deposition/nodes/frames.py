@@ -23,7 +23,7 @@ from paint_deposition.motion.transforms import (
 )
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.topics import AdaptiveSubscription, header
+from paint_deposition.nodes.topics import AdaptiveSubscription, part_pose_message
 
 # Transforms, static ones at the start included, may arrive later than the poses. One that is still
 # missing after so long is not waited for any longer.
@@ -94,11 +94,8 @@ class PartFrame:
             )
         if not (place and self._publisher):
             return
-        placed = TransformStamped(child_frame_id=self.frame_id)
-        placed.header = header(parent_frame.lstrip('/'), self._node.get_clock().now().nanoseconds)
-        t, q = placed.transform.translation, placed.transform.rotation
-        t.x, t.y, t.z, q.x, q.y, q.z, q.w = place
-        self._publisher.publish(placed)
+        now_ns = self._node.get_clock().now().nanoseconds
+        self._publisher.publish(part_pose_message(parent_frame, self.frame_id, now_ns, place))
 
     def on_part(self, message: PoseStamped) -> Place:
         """A pose in the frame of the part.

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import Point, PoseStamped, Vector3
+from geometry_msgs.msg import Point, PoseStamped, TransformStamped, Vector3
 from paint_msgs.msg import AtomizerState
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
@@ -203,6 +203,17 @@ def pose_message(frame_id: str, stamp_ns: int, values: Iterable[float]) -> PoseS
     p, q = pose.pose.position, pose.pose.orientation
     p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, values)
     return pose
+
+
+def part_pose_message(
+    parent_frame: str, frame_id: str, stamp_ns: int, values: Iterable[float]
+) -> TransformStamped:
+    """Where a part stands, x y z qx qy qz qw in another frame, from a time on."""
+    placed = TransformStamped(header=header(parent_frame.lstrip('/'), stamp_ns))
+    placed.child_frame_id = frame_id
+    t, q = placed.transform.translation, placed.transform.rotation
+    t.x, t.y, t.z, q.x, q.y, q.z, q.w = map(float, values)
+    return placed
 
 
 def state_message(**known: Any) -> AtomizerState:

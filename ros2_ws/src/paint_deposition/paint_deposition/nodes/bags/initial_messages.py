@@ -5,7 +5,6 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from geometry_msgs.msg import TransformStamped
 from paint_msgs.msg import AtomizerState, Part
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.serialization import deserialize_message, serialize_message
@@ -21,7 +20,7 @@ from paint_deposition.files.recordings.messages import (
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.bags.recorded_topic import PARAMETER_EVENTS, STATIC_TF
-from paint_deposition.nodes.topics import header_stamp_ns
+from paint_deposition.nodes.topics import header_stamp_ns, part_pose_message
 from paint_deposition.request import is_pose
 
 # Of each topic of a gun, for the time in which a simulator reads the mesh of the next part.
@@ -112,17 +111,15 @@ class InitialMessages:
                 until_ns[topic] = last_sent_ns
                 carried = [state for state in part.states if state.header.frame_id == name]
                 early[topic] = self._take_over(topic, carried, last_sent_ns)
-        # A simulator says where a part stands after it has said that the part is there.
+        # What the simulator says next of where the part stands may come when its run is over.
         later = [placed for placed in self._placed if placed.sent_ns > sent_ns]
-        before = [*self._placed][: len(self._placed) - len(later)][-1:]
-        place = list(Rigid.of(part.part_pose).values) if is_pose(part.part_pose) else []
-        stays = False
-        if before and not later:
-            placed = deserialize_message(before[0].cdr, TransformStamped).transform
-            t, q = placed.translation, placed.rotation
-            stays = [t.x, t.y, t.z, q.x, q.y, q.z, q.w] == place
-        self._placed = deque(before if stays else later, REMEMBERED_MESSAGES)
         early[self._part_pose] = len(later)
+        if is_pose(part.part_pose):
+            place = Rigid.of(part.part_pose).values
+            frames = part.part_parent_frame, part.header.frame_id
+            cdr = serialize_message(part_pose_message(*frames, last_ns, place))
+            later.insert(0, Recorded(self._part_pose, cdr, 0, sent_ns))
+        self._placed = deque(later, REMEMBERED_MESSAGES)
         return until_ns, {topic: count for topic, count in early.items() if count}
 
     def add_late(self, topic: str, cdr: bytes, sent_ns: int) -> None:
