@@ -92,7 +92,7 @@ def diagnose(
     state = _accept(state, fit, groups, left_out.error_um())
     progress('learning what the laws leave unexplained')
     state = _learn(state, best, left_out)
-    return _conclude(state, best, _others(state, search.beside(best)), p_value)
+    return _conclude(state, best, _others(state, search.beside(best, sought)), p_value)
 
 
 def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) -> Diagnosis:

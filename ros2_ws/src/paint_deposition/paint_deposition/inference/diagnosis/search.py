@@ -309,8 +309,11 @@ class Search:
                 return again
         return here
 
-    def beside(self, trial: EffectSet) -> dict[str, float]:
-        """Effects that may act beside a set, with their probabilities if one at the most does."""
+    def beside(self, trial: EffectSet, something: bool) -> dict[str, float]:
+        """Effects that may act beside a set, with their probabilities if one at the most does.
+
+        Where the test has shown that ``something`` acts and the set is empty, one does.
+        """
         for name in trial.proposed:
             self.with_effect(trial, name)
         larger = {
@@ -320,8 +323,10 @@ class Search:
             for name in names - trial.names
         }
         odds = self._log_odds(trial, larger)
-        shares = softmax([0.0, *odds.values()])[1:]
-        found = {n: p for n, p in zip(odds, shares.tolist(), strict=True) if n != UNKNOWN}
+        if trial.names or not something:
+            odds[''] = 0.0  # nothing more
+        shares = softmax([*odds.values()]).tolist()
+        found = {n: p for n, p in zip(odds, shares, strict=True) if n not in (UNKNOWN, '')}
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def groups(self, trial: EffectSet) -> tuple[EffectSet, dict[str, Group]]:
