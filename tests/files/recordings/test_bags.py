@@ -79,6 +79,17 @@ def test_states_come_as_they_were_sent_whichever_topic_was_received_first(tmp_pa
     assert pd.read_recording(tmp_path / 'run', None, '/s').trigger_rows.tolist() == [0, 30]
 
 
+@pytest.mark.parametrize('storage', ['sqlite3', 'mcap'])
+def test_where_the_stamps_start_again_states_keep_their_place(tmp_path, storage):
+    written, messages = straight_pass(triggers=False), Messages()
+    entries = pose_entries(written)
+    entries += [(topic, at + 10**9, pose) for topic, at, pose in entries]
+    entries += [('/s', START_NS + at, messages.state(START_NS, True, 1.0)) for at in (1, 10**9 - 1)]
+    bag = write_bag(tmp_path / 'run', sorted(entries, key=lambda entry: entry[1]), storage)
+    for path in bag, next(bag.glob(f'*.{"mcap" if storage == "mcap" else "db3"}')):
+        assert pd.read_recording(path, None, '/s').trigger_rows.tolist() == [1, len(written)]
+
+
 def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     written, messages = straight_pass(triggers=False), Messages()
     entries = pose_entries(written, delay_ns=3_000_000)

@@ -148,7 +148,7 @@ class Bag:
     def sent_ns(self, topics: Sequence[str]) -> dict[int, int]:
         """When messages of these topics were sent by when they were logged; empty if not known."""
         sent: dict[int, int] = {}
-        for file in [] if self._is_ros1 else mcap_files(self.path):
+        for file in (each for each in mcap_files(self.path) if each.suffix == '.mcap'):
             with _read_errors(self.path), file.open('rb') as stream:
                 read = make_reader(stream).iter_messages(topics)
                 sent |= {message.log_time: message.publish_time for *_, message in read}
