@@ -84,7 +84,8 @@ def test_where_the_stamps_start_again_states_keep_their_place(tmp_path, storage)
     written, messages = straight_pass(triggers=False), Messages()
     entries = pose_entries(written)
     entries += [(topic, at + 10**9, pose) for topic, at, pose in entries]
-    entries += [('/s', START_NS + at, messages.state(START_NS, True, 1.0)) for at in (1, 10**9 - 1)]
+    state = messages.state(START_NS, True, 1.0)
+    entries += [('/s', START_NS + at, state) for at in (1, 10**9 - 1)]
     bag = write_bag(tmp_path / 'run', sorted(entries, key=lambda entry: entry[1]), storage)
     for path in bag, next(bag.glob(f'*.{"mcap" if storage == "mcap" else "db3"}')):
         assert pd.read_recording(path, None, '/s').trigger_rows.tolist() == [1, len(written)]

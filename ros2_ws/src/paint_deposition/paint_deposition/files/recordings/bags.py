@@ -19,7 +19,12 @@ from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
 from paint_deposition.files.recordings.mcap_run import RunWriter, offered_qos
 from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, Signal, stamp_ns
-from paint_deposition.files.recordings.pose_topics import POSE_TYPE, POSES, read_poses, read_tf_poses
+from paint_deposition.files.recordings.pose_topics import (
+    POSE_TYPE,
+    POSES,
+    read_poses,
+    read_tf_poses,
+)
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
