@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import paint_deposition as pd
-from inference.fitting.panels import gauged, reading
+from inference.fitting.panels import PANEL, gauged, painted_by, reading
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
@@ -84,6 +84,23 @@ def test_readings_of_one_panel_or_of_all_upside_down(panels):
     (every,) = said(of(mirrored(first), mirrored(second)))
     assert every.startswith('the readings look mirrored top to bottom')
     assert 'about the middle of each part' in every
+
+
+def test_a_part_that_is_not_symmetric_is_mirrored_as_the_gun_sees_it(panels):
+    """Listed by their points, the readings of the other hand lie on this one, too."""
+
+    def bulged(places_m: np.ndarray) -> np.ndarray:
+        return places_m * [1.0, 0.0, 1.0] + 0.04 * places_m[:, 2:] ** 2 * [0.0, 1.0, 0.0]
+
+    surface = pd.Surface.from_triangles(bulged(PANEL.vertices_m), PANEL.faces, 0.05)
+    first, second = (
+        painted_by(MODEL, part.path, bulged(part.points.positions_m), surface=surface, name=name)
+        for name, part in zip('ab', panels.experiments, strict=True)
+    )
+    assert said(of(first, second)) == ()
+    places = bulged(first.readings.positions_m * [1.0, 0.0, -1.0] + [0.0, 0.0, 2.0])
+    (one,) = said(of(first.with_readings(replace(first.readings, positions_m=places)), second))
+    assert 'the readings of a look mirrored top to bottom' in one
 
 
 @pytest.mark.parametrize(

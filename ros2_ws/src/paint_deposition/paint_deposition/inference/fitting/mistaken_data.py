@@ -25,6 +25,7 @@ from paint_deposition.inference.fitting.outliers import FittedPoints
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Mistake, Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.places import MAX_DISTANCE_M, from_edges_m, on_face_m
 from paint_deposition.inference.readings.plausibility import check_unit
 from paint_deposition.kernel.blocks import box_centre_m
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -275,7 +276,7 @@ def _named(campaign: Campaign, some: Sequence[int]) -> str:
 
 
 def _mirrored(campaign: Campaign, some: Sequence[int]) -> Iterator[Meant]:
-    """The readings of some parts mirrored about the middle of each, if they lie on it then."""
+    """The readings of some parts mirrored about the middle of each, if the part is there, too."""
     for finding, (across, down) in MIRRORED.items():
         changed: dict[str, Experiment] = {}
         for part in (campaign.experiments[k] for k in some):
@@ -285,6 +286,10 @@ def _mirrored(campaign: Campaign, some: Sequence[int]) -> Iterator[Meant]:
             mirror = np.eye(3) - 2.0 * sum(np.outer(axis, axis) for axis in axes)
             centre_m = box_centre_m(surface.vertices_m)
             places_m = centre_m + (part.readings.positions_m - centre_m) @ mirror
+            # A part that is not symmetric has them elsewhere along the line of sight.
+            off = surface.locate(places_m).distance_m > MAX_DISTANCE_M
+            before_m, hit = on_face_m(surface, from_edges_m(surface, places_m))
+            places_m = np.where((off & hit)[:, np.newaxis], before_m, places_m)
             readings = replace(part.readings, positions_m=places_m, normals=None)
             with suppress(ReadingsError):
                 changed[part.name] = part.with_readings(readings)
