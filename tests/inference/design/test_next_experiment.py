@@ -130,7 +130,7 @@ def test_all_of_the_leading_group_compete_and_the_shapeless_cause_where_it_does(
     alone = EffectClass(('air_drift',), 0.6, 'air_drift')
     group = replace(alone, members=('air_drift', 'tcp_offset', 'tcp_tilt'))
     other = EffectClass(('fog_gradient',), 0.3, 'fog_gradient')
-    unknown = Unknown('tool_x_m', 0.01, {}, '', (), '', 0.0, 0.0)
+    unknown = Unknown('tool_x_m', 0.01, {}, '', '', (), '', 0.0, 0.0)
     for diagnosis, expected in (
         (diagnosed(study, fit, group, other), ('air_drift', 'tcp_offset', 'tcp_tilt')),
         (diagnosed(study, fit, alone, other), ('air_drift', 'fog_gradient')),

@@ -252,7 +252,7 @@ def law_rows(data: ReportData) -> list[dict[str, str]]:
 
 def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     """The pattern's parameters; with 95 % intervals where the model was fitted."""
-    fitted = estimates(data.diagnosis.history[-1].fit) if data.diagnosis else ()
+    fitted = estimates(data.diagnosis.history[-1].fit.marginal) if data.diagnosis else ()
     found = {estimate.name: estimate for estimate in fitted}
     brushes, rows = data.model.brushes, []
     of = [f'brush {brush.number}: ' if len(brushes) > 1 else '' for brush in brushes] or ['']

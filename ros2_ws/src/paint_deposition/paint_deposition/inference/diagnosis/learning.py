@@ -269,6 +269,7 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
             'residual_um': (smooth[points] @ coefficients).tolist(),
         },
         first.description if first else 'no single place stands out',
+        first.experiment if first else '',
         tuple(shown),
         shown[0] if shown and shown == names[-len(shown) :] != names else '',
         first.mean_residual_um if first else 0.0,

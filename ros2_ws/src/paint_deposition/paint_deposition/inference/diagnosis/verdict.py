@@ -13,6 +13,7 @@ from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
+from paint_deposition.inference.diagnosis.model_space import ALPHA
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures
 from paint_deposition.inference.fitting.least_squares import Fit
@@ -62,6 +63,7 @@ class Unknown:
     p_value: float  # of that dependence
     curve: dict[str, list[float]]  # values of the covariate and mean residual there [um]
     where: str  # the place where it is strongest, in words
+    part: str  # of which that is, '' where no place stands out
     parts: tuple[str, ...]  # names of those on which it shows
     since: str  # name of the first of them, if it shows on all that follow and on none before
     # Mean residual at that place [um], and over the film that the model has there.
@@ -69,18 +71,24 @@ class Unknown:
     share: float
 
     def __str__(self) -> str:
+        against = f'most against {self.covariate}' if self.is_clear else ''
+        if not self.part:
+            return f'It shows {against}; {self.where}.' if against else f'{self.where.capitalize()}.'
         more, since = 'more' if self.mean_residual_um > 0.0 else 'less', ''
+        on = f'on {", ".join(self.parts)}' if len(self.parts) > 1 else ''
         if self.since:
-            since = f', since {self.since}'
-        elif len(self.parts) > 1:
-            since = f', on {", ".join(self.parts)}'
-        if not self.parts:
-            return f'It shows most against {self.covariate}; {self.where}.'
+            since, on = f', since {self.since}', ''
+        shows = ', '.join(filter(None, [on, against]))
         return (
-            f'At the {self.where.partition(", ")[0]} of {self.parts[0]} there is '
+            f'At the {self.where.partition(", ")[0]} of {self.part} there is '
             f'{abs(self.mean_residual_um):.1f} µm ({100.0 * abs(self.share):.0f} %) {more} than '
-            f'the model says{since}; it shows most against {self.covariate}.'
+            f'the model says{since}{"; it shows " if shows else ""}{shows}.'
         )
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether it depends on the covariate by more than chance."""
+        return self.p_value < ALPHA
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from scipy.cluster.vq import kmeans2
+from scipy.stats import chi2
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -32,6 +33,9 @@ FOLDS = 6
 # out, as a standard deviation over the film: assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
 
+
+# Parts and gauge sessions that differ so improbably are no usual ones.
+UNUSUAL = 0.02
 
 # Data that are simply wrong, see ``mistaken_data``: a sentence with the remedy, and whether
 # nothing can be concluded from them.
@@ -214,6 +218,42 @@ class Study:
     def nuisance(self) -> np.ndarray:
         """(P, n) nuisance directions over the noise: those of the random effects."""
         return _columns(self.random_effects, len(self))
+
+    def level_doubt(self, predicted_um: np.ndarray) -> str:
+        """That parts and gauge sessions differ by more than usual ones do; '' if they do not.
+
+        Args:
+            predicted_um: (P,) film of a model [um].
+        """
+        columns, effects = self.nuisance, self.random_effects
+        if not effects:
+            return ''
+        misfit = (self.measured_um - predicted_um) / self.sigma_um
+        # Amplitudes of unit variance, and the share of it that the readings tell.
+        precision = np.eye(columns.shape[1]) + columns.T @ columns
+        mean = np.linalg.solve(precision, columns.T @ misfit)
+        known = np.eye(columns.shape[1]) - np.linalg.inv(precision)
+        shares, ways = np.linalg.eigh(known)
+        seen = shares > 0.5
+        square = float(np.sum((ways[:, seen].T @ mean) ** 2 / shares[seen]))
+        p_value = float(chi2.sf(square, np.count_nonzero(seen)))
+        if p_value > UNUSUAL:
+            return ''
+        first, levels = 0, []
+        for each in effects:
+            values = each.mixing @ mean[first : first + len(each.names)]
+            first += len(each.names)
+            told = ', '.join(
+                f'{name} {value:+.1f} {each.unit}'
+                for name, value in zip(each.names, values, strict=True)
+            )
+            steps = np.diff(values)
+            way = ', rising' if (steps > 0.0).all() else ', falling' if (steps < 0.0).all() else ''
+            levels.append(f'{each.kind}s {told}{way}')
+        return (
+            f'Beside the model the parts differ by more than usual parts do (p = {p_value:.2g}): '
+            f'{"; ".join(levels)}. Check flow, booth and gauge from part to part.'
+        )
 
     def predicted_without_um(
         self, fit: Fit, out: np.ndarray, free: np.ndarray | None = None
