@@ -26,6 +26,7 @@ from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.film.layout import term_weights
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.model.eq1_pattern import Brush, PlanarPattern
 from scenes import stamps_ns, straight_pass
@@ -250,8 +251,9 @@ def test_a_campaign_predicts_each_layer_as_simulate_does(folder, wet_on_wet):
     ]
     predicted_um = Forward(read).predict_um(model)[read.means.owner]
     assert predicted_um == pytest.approx(taken_um, abs=1e-5)
-    terms_um = Forward(read, model.effects).terms(model).with_gains_um(model.patterns)
-    assert terms_um[read.means.owner] == pytest.approx(taken_um, abs=1e-5)
+    weights, _ = term_weights(model.planar)
+    weighted_um = Forward(read, model.effects).of_weights(model)(weights)
+    assert weighted_um[read.means.owner] == pytest.approx(taken_um, abs=1e-5)
 
 
 def test_wet_readings_are_dried_by_the_solids_of_their_coat(folder):

@@ -24,6 +24,7 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
     flux_around,
     footprint_basis,
 )
+from paint_deposition.inference.fitting.forward import derivatives_by_pattern
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.random_effects import smooth
 from paint_deposition.inference.fitting.study import Study
@@ -131,8 +132,9 @@ class Footprints:
         of_film = basis.film_um / study.sigma_um[:, np.newaxis]
         # Both are of the flux alone: effects would bend the one and not the other.
         bare = fit.parameters.pattern.jacobian(fit.vector[: len(fit.parameters.pattern)])
-        terms = study.forward.terms(fit.model.model_copy(update={'effects': ()}))
-        pattern = terms.derivatives_um() @ bare / study.sigma_um[:, np.newaxis]
+        readings_of = study.forward.of_weights(fit.model.model_copy(update={'effects': ()}))
+        by_pattern = derivatives_by_pattern(readings_of, fit.model.patterns)
+        pattern = by_pattern @ bare / study.sigma_um[:, np.newaxis]
         columns, laws = [], []
         for size in PRIOR.footprints:
             of_wave = np.where(HARMONICS % 2, min(size, PRIOR.sides), size)
