@@ -89,11 +89,10 @@ def test_a_prediction_without_the_reading_is_that_of_the_others_alone():
     # Without covariates, whose scale would be that of the readings.
     misfit, row = replace(built_up(scattered(4)), covariates={}), 17
     others = np.delete(np.arange(COUNT), row)
-    whole, without = misfit.leave_one_out, misfit.select(others).leave_one_out
-    joint = np.logaddexp.reduce(whole.log_weight) - np.logaddexp.reduce(without.log_weight)
+    joint = misfit.log_likelihood - misfit.select(others).log_likelihood
     normal = -0.5 * np.log(2.0 * np.pi)
     # The smallest directions of a field, which are left out, are not quite those of all.
-    assert whole.log_density[row] == pytest.approx(joint + normal, abs=0.01)
+    assert misfit.log_density[row] == pytest.approx(joint + normal, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +110,7 @@ def test_what_was_probably_meant(written, expected, guess):
 @pytest.mark.parametrize('texture', [0.002, 0.02])
 def test_the_texture_is_estimated_beside_a_missing_effect(texture):
     misfits = [built_up(scattered(seed, texture)) for seed in range(12)]
-    shares = [misfit.leave_one_out.texture_share for misfit in misfits]
+    shares = [misfit.texture_share for misfit in misfits]
     assert np.mean(shares) == pytest.approx(texture, abs=0.006)
 
 

@@ -14,7 +14,7 @@ from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
-from paint_deposition.inference.fitting.estimates import DiscrepancyFigures
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, Estimate
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.panel import Panel
 from paint_deposition.inference.fitting.parameters import Posterior
@@ -34,22 +34,13 @@ def percent(probability: float) -> str:
 
 
 @dataclass(frozen=True)
-class Interval:
-    """A parameter's value with its 95 % interval, in its own unit."""
-
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
 class EffectClass:
     """Effects that these readings cannot tell apart."""
 
     members: tuple[str, ...]  # ids, most probable first
     probability: float  # that one of them is missing
     best: str  # id of the most probable member
-    parameters: dict[str, Interval] = field(default_factory=dict)  # of the best member, by name
+    parameters: dict[str, Estimate] = field(default_factory=dict)  # of the best member, by name
     # Before and after adding the best member, on points left out.
     holdout_rmse_um: dict[str, float] = field(default_factory=dict)
 
@@ -265,7 +256,11 @@ class Diagnosis:
         places, sprays = self.proposals
         classes = []
         for found in self.classes:
-            classes.append(asdict(found))
+            ends = {
+                name: {'value': one.value, 'low': one.low, 'high': one.high}
+                for name, one in found.parameters.items()
+            }
+            classes.append(asdict(found) | {'parameters': ends})
             law = self.model.effect(found.best)
             if isinstance(law, LearnedLaw):
                 classes[-1]['forms'] = [form.to_dict() for form in forms_of(law)]

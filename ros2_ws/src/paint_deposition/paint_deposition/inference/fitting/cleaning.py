@@ -81,7 +81,7 @@ def _cleaned(
     # accepted: a coarser one looks like anything that is missing from the model and narrower than
     # the distance between readings.
     if study.noise.source != 'assumed':
-        share = misfit.leave_one_out.texture_share
+        share = misfit.texture_share
         if share < TEXTURE_SHARE:
             study = replace(study, estimated_texture=share)
             fit = _fitted(study, fit.model, 1, seed, known)

@@ -14,7 +14,6 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from scipy.special import logsumexp
 
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -113,8 +112,7 @@ class Weighed:
         # The model is linear around the fit, and its prior is not centred there.
         off = fit.residual + fit.jacobian @ (fit.vector - fit.parameters.prior.centre)
         misfit = replace(fitted_points(self.study, fit), residual_um=off * self.study.sigma_um)
-        weights = misfit.leave_one_out.log_weight
-        return float(logsumexp(weights)) - self.log_scale + self.log_size()
+        return misfit.log_likelihood - self.log_scale + self.log_size()
 
     @property
     def rough_log_weight(self) -> float:
