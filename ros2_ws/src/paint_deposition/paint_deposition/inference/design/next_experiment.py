@@ -6,7 +6,7 @@ experiments that are about as good.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -41,16 +41,6 @@ SPACING_M = 0.05
 PAINTED = 0.2
 
 
-@dataclass(frozen=True)
-class ScoredExperiment:
-    """A spray that was tried in the model."""
-
-    change: Change
-    spray: Spray
-    worth: float
-    spot: int | None = None
-
-
 @on_one_thread
 def with_proposals(diagnosis: Diagnosis, library: Mapping[str, type[Effect]]) -> Diagnosis:
     """A diagnosis with places and sprays that would settle between the competing explanations.
@@ -74,24 +64,24 @@ def _sprays(study: Study, contenders: Sequence[Contender]) -> list[Spray]:
     part = study.campaign.experiments[int(by_part.argmax())]
     made = _best([_tried(study, contenders, part, change) for change in MENU])
     # Of the best single changes two at once are tried.
-    leading = [one.change for one in made[:4]]
+    leading = [change for one in made[:4] for change in MENU if (change.key,) == one.changes]
     made += _best([_tried(study, contenders, part, change) for change in pairs(leading)])
     effects = (contender.fit.model.effect(contender.name) for contender in contenders)
     families = {effect.family for effect in effects if effect is not None}
     if suits(contenders[-1].fit.model, families):
-        tried = [_tried(study, contenders, part, AS_BEFORE, spot) for spot in spots(part, 5)]
-        still = _best(tried)
-        made += still
+        tried = ((k, _tried(study, contenders, part, AS_BEFORE, k)) for k in spots(part, 5))
+        still = {spot: spray for spot, spray in tried if spray is not None}
+        made += still.values()
         if still:
             # What may be changed of a gun that stands still.
             kinds = ('roll', 'standoff', 'part', 'voltage', 'draught')
             changes = [change for change in MENU if change.kind in kinds]
-            spot = still[0].spot
+            spot = max(still, key=lambda spot: still[spot].worth)
             made += _best([_tried(study, contenders, part, change, spot) for change in changes])
-    return [one.spray for one in _best(made)[:15]]
+    return _best(made)[:15]
 
 
-def _best(tried: Sequence[ScoredExperiment | None]) -> list[ScoredExperiment]:
+def _best(tried: Sequence[Spray | None]) -> list[Spray]:
     """Experiments that can be done, best first."""
     return sorted((one for one in tried if one is not None), key=lambda one: -one.worth)
 
@@ -102,7 +92,7 @@ def _tried(
     experiment: Experiment,
     change: Change,
     spot: int | None = None,
-) -> ScoredExperiment | None:
+) -> Spray | None:
     """How well the readings would separate with this spray, None where it cannot be done.
 
     Args:
@@ -133,17 +123,13 @@ def _tried(
         return None
     forecast = Forecast.of(contenders, together, np.arange(len(together)), len(study))
     now, then = forecast.separations
-    spray = Spray(
+    return Spray(
         _in_words(study, experiment, change, stand),
         tuple(contender.name for contender in contenders), then,
         now, len(film_um), experiment.name, (*([KEY] if stand else []), *change.key.split()),
         forecast.chance, stand.peak_um if stand else float(film_um.max()),
-        float(experiment.means.mean_um.max()), stand,
+        float(experiment.means.mean_um.max()), stand, change.cost,
     )  # fmt: skip
-    # To spray on one spot costs one unit more, and so does a film that may sag.
-    cost = change.cost + (stand is not None) + bool(spray.film_words)
-    # One unit of cost is worth this share of the chance of settling.
-    return ScoredExperiment(change, spray, spray.chance * (1.0 - 0.05 * cost), spot)
 
 
 def _together(study: Study, experiments: Sequence[Experiment]) -> Study:

@@ -170,6 +170,15 @@ class Spray:
     peak_um: float = float('nan')  # thickest film at these points
     peak_now_um: float = float('nan')  # as measured on that part
     stand: StationarySpray | None = None  # where the gun stands still, if it does
+    cost: float = 0.0  # of what is done otherwise: 1 for an entry in the programme
+
+    @property
+    def worth(self) -> float:
+        """The chance, less for what it costs."""
+        # To spray on one spot costs one unit more, and so does a film that may sag.
+        cost = self.cost + (self.stand is not None) + bool(self.film_words)
+        # One unit of cost is worth this share of the chance of settling.
+        return self.chance * (1.0 - 0.05 * cost)
 
     @property
     def film_words(self) -> str:
