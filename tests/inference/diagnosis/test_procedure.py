@@ -50,7 +50,7 @@ def test_nothing_is_found_where_nothing_is_missing(clean):
     assert nothing_found.detectable.keys().isdisjoint(nothing_found.not_testable)
     assert set(nothing_found.detectable) | set(nothing_found.not_testable) == set(EFFECTS)
     misfits = nothing_found.comparisons[0].misfits
-    assert [m.label for m in misfits if m.kind == 'group'] == ['column 1']
+    assert [label for _, kind, label in misfits if kind == 'group'] == ['column 1']
     figures = nothing_found.discrepancy
     # The paint shop's sprays are even, and its footprint is that of eq. (1).
     assert 0.0 < figures.setting_share < 0.03

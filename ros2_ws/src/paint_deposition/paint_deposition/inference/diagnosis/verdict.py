@@ -213,15 +213,12 @@ class Diagnosis:
     @cached_property
     def worse(self) -> tuple[str, ...]:
         """Parts, rows and columns that the newest model predicts worse, a phrase each."""
-        old, new = (
-            [misfit for misfit in comparison.misfits if misfit.kind in ('experiment', 'group')]
-            for comparison in (self.comparisons[0], self.comparisons[-1])
-        )
+        after = self.comparisons[-1].misfits
         return tuple(
-            f'{now.experiment}{"" if now.kind == "experiment" else f", {now.label}"}: '
-            f'{before.residuals.rmse_um:.2f} -> {now.residuals.rmse_um:.2f} µm'
-            for before, now in zip(old, new, strict=True)
-            if is_worse(before.residuals, now.residuals)
+            f'{name}{"" if kind == "experiment" else f", {label}"}: '
+            f'{before.rmse_um:.2f} -> {after[name, kind, label].rmse_um:.2f} µm'
+            for (name, kind, label), before in self.comparisons[0].misfits.items()
+            if kind in ('experiment', 'group') and is_worse(before, after[name, kind, label])
         )
 
     @property
