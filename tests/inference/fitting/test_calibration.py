@@ -14,7 +14,7 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.film.pass_film import collapse_um, sampled_collapse
 from paint_deposition.inference.fitting.estimates import estimates
-from paint_deposition.inference.fitting.panel import Panel, fit_collapse, short_reaches
+from paint_deposition.inference.fitting.panel import Panel, fit_collapse, reach_of, short_reaches
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from virtual_paint_shop.files import write
@@ -191,13 +191,13 @@ def test_paint_beyond_the_readings_is_that_of_the_normal_and_none_is_not_warned_
     gaussian = pd.DepositionModel(planar=PlanarPattern(K2=1.0, K3=0.0, sigma2_m=sigma_m))
     one_pass, ends = passes((1.0,)), ((0.8, 1.3), (0.6, 1.4))
     narrow, wide = (painted_by(gaussian, one_pass, column(*e), name=f'{e}') for e in ends)
-    (reach,) = short_reaches(pd.Campaign((narrow,)), gaussian)
-    assert sorted(reach.ends_m) == pytest.approx([0.2, 0.3], abs=1e-6)
-    expected = norm.sf(np.array(reach.ends_m) / sigma_m)
-    assert reach.beyond == pytest.approx(expected, rel=1e-3)
-    assert reach.needed_m == pytest.approx(norm.isf(0.025) * sigma_m, rel=1e-3)
+    ends_m, beyond, needed_m = reach_of(Panel.of(narrow), gaussian)
+    assert sorted(ends_m) == pytest.approx([0.2, 0.3], abs=1e-6)
+    assert beyond == pytest.approx(norm.sf(np.array(ends_m) / sigma_m), rel=1e-3)
+    assert needed_m == pytest.approx(norm.isf(0.025) * sigma_m, rel=1e-3)
+    assert [*short_reaches(pd.Campaign((narrow,)), gaussian)] == [0]
     for enough in ((wide,), (narrow, wide)):
-        assert short_reaches(pd.Campaign(enough), gaussian) == ()
+        assert short_reaches(pd.Campaign(enough), gaussian) == {}
     result = pd.calibrate(panel_campaign(1.4, (0.7,)))
     assert not any('lands further out' in warning for warning in result.warnings)
     assert len(result.shifts) == 0

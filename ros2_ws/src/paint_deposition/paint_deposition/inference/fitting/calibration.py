@@ -190,12 +190,12 @@ def calibrate(
         return min(fits, key=lambda fit: fit.objective)
 
     fit = best_fit(study)
-    reaches = short_reaches(study.campaign, fit.model)
-    moved = shifts(study, fit, reaches, best_fit)
+    short = short_reaches(study.campaign, fit.model)
+    moved = shifts(study, fit, short, best_fit)
     values, pairs = estimates(fit.marginal, moved), correlations(fit.marginal, moved)
     widened = 'the intervals are widened by what the fit changes without the readings at the ends'
     warnings = [*_warnings(study, fit, values, pairs), *impossible_brushes(fit.model)]
-    warnings += [f'{reach}; {widened}' for reach in reaches]
+    warnings += [f'{reach}; {widened}' for reach in short.values()]
     residuals = study.residuals_by_experiment(fit.predicted_um)
     return Calibration(study, fit, values, pairs, residuals, panels, tuple(warnings), moved)
 
