@@ -160,14 +160,14 @@ def unseen_error(painted: Painted, campaign: Campaign, unseen: Campaign, model) 
         predicted, there = read_um[own], there_um[other]
         sigma = float(np.median(part.unseen_sigma_um))
         columns = np.column_stack([painted.level * predicted, np.full(own.sum(), painted.zero_um)])
-        rest = campaign.means.mean_um[own] - predicted
+        rest = campaign.readings.mean_um[own] - predicted
         away = np.abs(rest - np.median(rest))
         sound = away <= TYPING_ERROR * np.median(away)
         rest, columns = rest[sound], columns[sound]
         inner = sigma**2 * np.eye(2) + columns.T @ columns
         level, zero = np.linalg.solve(inner, columns.T @ rest)
         shown = there * (1.0 + painted.level * level) + painted.zero_um * zero
-        squares.append((unseen.means.mean_um[other] - shown) ** 2)
+        squares.append((unseen.readings.mean_um[other] - shown) ** 2)
         noise.append(part.unseen_sigma_um**2)
     return float(np.sqrt(1.0 + np.mean(np.concatenate(squares)) / np.mean(np.concatenate(noise))))
 

@@ -249,11 +249,11 @@ def test_a_campaign_predicts_each_layer_as_simulate_does(folder, wet_on_wet):
     assert [one.name for one in read.experiments] == [
         f'panel: {x}' for x in (*LAYERS[:2], 'total')
     ]
-    predicted_um = Forward(read).predict_um(model)[read.means.owner]
+    predicted_um = Forward(read).predict_um(model)[read.readings.owner]
     assert predicted_um == pytest.approx(taken_um, abs=1e-5)
     weights, _ = term_weights(model.planar)
     weighted_um = Forward(read, model.effects).of_weights(model)(weights)
-    assert weighted_um[read.means.owner] == pytest.approx(taken_um, abs=1e-5)
+    assert weighted_um[read.readings.owner] == pytest.approx(taken_um, abs=1e-5)
 
 
 def test_wet_readings_are_dried_by_the_solids_of_their_coat(folder):

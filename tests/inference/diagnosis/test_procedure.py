@@ -128,7 +128,7 @@ def test_an_effect_in_the_start_model_is_refitted_and_not_found_again(shielded):
 
 def test_a_few_readings_are_too_few_and_a_path_that_misses_the_part_is_told(clean):
     for points in (2, 11):
-        few = clean.with_readings(clean.readings.select(clean.means.owner < points))
+        few = clean.with_readings(clean.readings.select(clean.readings.owner < points))
         diagnosis = diagnose(pd.Campaign((few,)), BASE, {})
         assert diagnosis.verdict == 'fit_broken'
         assert f'{points} points cannot determine 7 parameters' in diagnosis.reason

@@ -47,13 +47,13 @@ def test_a_panel_is_seen_as_one_with_its_turned_passes(panel, turned):
         collapse_um(TRUTH, seen.across_m - line, speed, seen.distance_m, seen.travel_rad, turned=m)
         for line, speed, m in zip(seen.passes_m, seen.speed_m_per_s, seen.mirrored, strict=True)
     )
-    off_um = film_um - part.means.mean_um
+    off_um = film_um - part.readings.mean_um
     assert np.sqrt(np.mean(off_um**2)) < 0.3
-    assert (np.abs(part.means.mean_um - panel.means.mean_um).max() > 1.0) == turned
+    assert (np.abs(part.readings.mean_um - panel.readings.mean_um).max() > 1.0) == turned
 
 
 def test_three_gaussians_forgive_gross_errors(panel):
-    seen, measured = Panel.of(panel), panel.means.mean_um.copy()
+    seen, measured = Panel.of(panel), panel.readings.mean_um.copy()
     clean = fit_collapse(seen, measured, np.full(len(measured), 0.3))
     measured[[5, 20]] += 12.0
     robust = fit_collapse(seen, measured, np.full(len(measured), 0.3))
@@ -78,7 +78,7 @@ def test_true_values_lie_in_their_intervals(panel):
 
 def test_a_pattern_that_no_bell_has_is_named_as_what_the_model_lacks(panel):
     """Fog that settles low looks like a ring as large as the panel."""
-    film_um, height_m = panel.means.mean_um, column()[:, 2]
+    film_um, height_m = panel.readings.mean_um, column()[:, 2]
     foggy = with_film(panel, film_um + 40.0 * np.exp(-height_m[: len(film_um)] / 0.4))
     calibrated = pd.calibrate(pd.Campaign((foggy,)))
     strange = [one for one in calibrated.parameters if 'no usual bell has' in one.reason]
@@ -135,7 +135,7 @@ SIX = slice(10, 16)
 
 
 def in_unit(panel, factor, rows=slice(None)):
-    film_um = panel.means.mean_um.copy()
+    film_um = panel.readings.mean_um.copy()
     film_um[rows] /= factor
     return with_film(panel, film_um)
 
@@ -143,12 +143,12 @@ def in_unit(panel, factor, rows=slice(None)):
 @pytest.mark.parametrize(
     ('made', 'words'),
     [
-        (lambda panel: with_film(panel, panel.means.mean_um[:6]),
+        (lambda panel: with_film(panel, panel.readings.mean_um[:6]),
          'readings at 6 points; .* measure at least 10'),
         (lambda _: painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)),
          'one side of the passes'),
         (lambda panel: with_film(panel, np.full(40, 20.0), 2, noise_um=0.7), 'no pattern in it'),
-        (lambda panel: with_film(panel, np.where(np.arange(40) == 7, -4.5, panel.means.mean_um)),
+        (lambda of: with_film(of, np.where(np.arange(40) == 7, -4.5, of.readings.mean_um)),
          "point 'P7' reads -4.5 µm; .* zero the gauge"),
         (lambda panel: in_unit(panel, 25.4), 'look like mil, say unit: {thickness: mil}'),
         (lambda panel: in_unit(panel, 1000.0), 'look like mm, say unit: {thickness: mm}'),

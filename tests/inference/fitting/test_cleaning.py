@@ -121,7 +121,7 @@ def test_a_typing_error_does_not_change_the_verdict(tmp_path):
         tmp_path, seed=5, truth='edge_build', amplitude=0.5, experiments=('door',),
         readings=97, repeats=20, style='random', parcels=2_000_000,
     ).experiments  # fmt: skip
-    row = int(np.flatnonzero(door.means.repeats[door.means.owner] == 1)[10])
+    row = int(np.flatnonzero(door.readings.repeats[door.readings.owner] == 1)[10])
     factor = np.where(np.arange(len(door.readings)) == row, 10.0, 1.0)
     bad = pd.Campaign((reading(door, factor * door.readings.thickness_um),))
     library = {name: EFFECTS[name] for name in ('air_drift', 'edge_build', 'faraday_shielding')}
@@ -174,7 +174,7 @@ def test_the_mean_of_a_cell_is_its_film_and_readings_by_hand_beside_a_scan_are_k
     sigma_um = cells.readings.sigma_um
     expected_um = NOISE_UM / np.sqrt(SCANNED / len(cells))
     assert np.median(sigma_um) == pytest.approx(expected_um, rel=0.1)
-    off_um = cells.means.mean_um - Forward(cells, ()).predict_um(MODEL)
+    off_um = cells.readings.mean_um - Forward(cells, ()).predict_um(MODEL)
     # Chi-square of that many cells: within five of its standard deviations.
     five_sd = 5.0 * np.sqrt(2.0 / len(cells))
     assert np.mean((off_um / sigma_um) ** 2) == pytest.approx(1.0, abs=five_sd)

@@ -85,7 +85,7 @@ class ReportData:
         """Where the film measured at each point is beside its own target band; '' without one."""
         target_of, bands = self.study.campaign.target_of, []
         for one in self.experiments:
-            measured = one.means.mean_um
+            measured = one.readings.mean_um
             target, tolerance = wanted_at(measured, *target_of(one), one.zones_of_points)
             off = measured - target
             within = np.where(np.abs(off) <= tolerance, 'in', np.where(off < 0.0, 'low', 'high'))

@@ -181,7 +181,7 @@ def point_rows(data: ReportData) -> list[dict[str, Any]]:
     scatter_um = TWO_SIDED_95 * found.sigma_um
     rows: list[dict[str, Any]] = []
     for k, experiment in enumerate(data.experiments):
-        labels, groups = experiment.readings.point[experiment.means.first], experiment.groups
+        labels, groups = experiment.readings.point[experiment.readings.first], experiment.groups
         places = 1e3 * experiment.measured_points.positions_m
         for row, point, group, place in zip(
             range(*data.rows_of(k).indices(len(data.study))), labels, groups, places, strict=True

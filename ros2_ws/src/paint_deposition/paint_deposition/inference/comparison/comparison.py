@@ -84,14 +84,14 @@ class ZoneReadings:
 
 def zone_readings(campaign: Campaign, readings: Residuals) -> tuple[ZoneReadings, ...]:
     """The zones of each experiment, by the residuals of all N readings used."""
-    owner, found = campaign.experiment_of[campaign.means.owner], []
+    owner, found = campaign.experiment_of[campaign.readings.owner], []
     for number, experiment in enumerate(campaign.experiments):
         of, own = experiment.zones_of_points, readings.select(owner == number)
         if of is None:
             continue
         points = experiment.readings.point
         for k, zone in enumerate(of.zones):
-            inside = (of.number == k)[experiment.means.owner]
+            inside = (of.number == k)[experiment.readings.owner]
             found.append(
                 ZoneReadings.of(experiment.name, zone, own.select(inside), points[inside])
             )
@@ -207,8 +207,8 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
     """Predict every reading and summarise the misfit."""
     points = study.residuals(study.forward.predict_um(model))
     campaign = study.campaign
-    predicted_um = points.predicted_um[campaign.means.owner]
-    sigma_um = np.hypot(study.noise.sigma_um, study.texture_um[campaign.means.owner])
+    predicted_um = points.predicted_um[campaign.readings.owner]
+    sigma_um = np.hypot(study.noise.sigma_um, study.texture_um[campaign.readings.owner])
     readings = Residuals(campaign.readings.thickness_um, predicted_um, sigma_um)
     dependences = {}
     for name, values in study.covariates(model).items():
@@ -226,7 +226,7 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
 def _misfits(
     study: Study, model: DepositionModel, residuals: Residuals
 ) -> dict[tuple[str, str, str], Residuals]:
-    owner = study.campaign.means.owner
+    owner = study.campaign.readings.owner
     experiment_of = study.campaign.experiment_of[owner]
     groups, passes = study.campaign.readings.group, study.passes(model)[owner]
     rows = {}

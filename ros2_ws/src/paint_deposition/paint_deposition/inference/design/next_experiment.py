@@ -128,7 +128,7 @@ def _tried(
         tuple(contender.name for contender in contenders), then,
         now, len(film_um), experiment.name, (*([KEY] if stand else []), *change.key.split()),
         forecast.chance, stand.peak_um if stand else float(film_um.max()),
-        float(experiment.means.mean_um.max()), stand, change.cost,
+        float(experiment.readings.mean_um.max()), stand, change.cost,
     )  # fmt: skip
 
 
@@ -190,7 +190,7 @@ def _with_candidates(study: Study, number: int, model: DepositionModel) -> Exper
     chosen = random.permutation(len(surface.vertices_m))[: 4 * count]
     points = surface.points().select(chosen)
     inside = chosen[points.edge_distance_m > EDGE_MARGIN_M][:count]
-    session = experiment.readings.session[experiment.means.first]
+    session = experiment.readings.session[experiment.readings.first]
     readings = Readings.of(
         np.vstack([here.positions_m, surface.vertices_m[inside]]),
         np.concatenate([study.measured_um[own], np.zeros(len(inside))]),

@@ -80,7 +80,7 @@ class StationarySpray:
             return None
         return StationarySpray(
             points.positions_m[row], normal, across / np.linalg.norm(across), standoff, dwell,
-            flow, float(experiment.means.mean_um[row]), rate * dwell, brush,
+            flow, float(experiment.readings.mean_um[row]), rate * dwell, brush,
         )  # fmt: skip
 
     def sprayed(self, experiment: Experiment) -> Experiment:

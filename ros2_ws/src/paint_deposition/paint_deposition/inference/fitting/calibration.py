@@ -168,7 +168,7 @@ def calibrate(
             f'readings at {len(study)} points; the pattern has 7 parameters, measure at least '
             f'{FEWEST_POINTS} points, better 30'
         )
-    owner = study.campaign.experiment_of[study.campaign.means.owner]
+    owner = study.campaign.experiment_of[study.campaign.readings.owner]
     for number, experiment in enumerate(study.campaign.experiments):
         check_readings(experiment.readings, study.noise.sigma_um[owner == number])
     progress('looking for outliers among the readings')
@@ -247,7 +247,7 @@ def _warnings(
         )
     elif len(far):
         campaign, worst = study.campaign, np.argmax(away)
-        label = campaign.readings.point[campaign.means.first[worst]]
+        label = campaign.readings.point[campaign.readings.first[worst]]
         warnings.append(
             f'{len(far)} of {len(study)} points are off by more than {OUTLIER_SIGMAS:g} standard '
             f"deviations, most of all point '{label}': measure there again"
