@@ -7,6 +7,7 @@ experiments that are about as good.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.design.contenders import (
     Contender,
     Forecast,
-    Placement,
     contenders_of,
+    one_by_one,
 )
 from paint_deposition.inference.design.sprays import AS_BEFORE, MENU, Change, pairs
 from paint_deposition.inference.diagnosis.proposals import (
@@ -161,19 +162,15 @@ def _places(study: Study, contenders: Sequence[Contender]) -> list[Place]:
         return []
     rows = np.flatnonzero(~taken)
     order = np.concatenate([np.flatnonzero(taken), rows])
-    placement = Placement(Forecast.of(contenders, together, order, len(order) - len(rows)))
+    forecast = Forecast.of(contenders, together, order, len(order) - len(rows))
     part, positions_m, film_um = part[rows], positions_m[rows], together.measured_um[rows]
     usable = film_um > PAINTED * np.mean(study.measured_um)
     places: list[Place] = []
-    while usable.any() and len(places) < 8:
-        pair = placement.nearest()
-        best = int(np.argmax(np.where(usable, placement.gains()[pair], -1.0)))
-        before = placement.separation(pair)
-        placement.take(best)
+    for best, pair, (before, after) in islice(one_by_one(forecast, usable), 8):
         names = contenders[pair[0]].name, contenders[pair[1]].name
         why = (
-            f'separates {names[0]} from {names[1]}: {before:.1f} -> '
-            f'{placement.separation(pair):.1f} standard deviations'
+            f'separates {names[0]} from {names[1]}: {before:.1f} -> {after:.1f} standard '
+            'deviations'
         )
         places.append(Place(positions_m[best], parts[part[best]].name, why, float(film_um[best])))
         near = np.linalg.norm(positions_m - positions_m[best], axis=1) < SPACING_M
