@@ -17,7 +17,7 @@ from paint_deposition.inference.readings.places import (
 )
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.points import SurfacePoints, angles_rad
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import Zones
 
@@ -71,13 +71,13 @@ class Experiment:
         first, owner = readings.first, readings.owner
         normals = None if readings.normals is None else readings.normals[first]
         positions = readings.positions_m[first]
-        place = surface.locate(positions, normals)
-        refuse_off_surface(surface, readings, place.distance_m)
+        places_m, outward, distance_m = surface.locate(positions, normals)
+        refuse_off_surface(surface, readings, distance_m)
         if normals is not None:
-            refuse_other_side(readings, place.angle_rad)
+            refuse_other_side(readings, angles_rad(outward, normals))
         points = surface.at(positions, normals, stencil_m=STENCIL_M)
         if not readings.group.astype(bool).any():
-            lines = columns_or_rows(surface, path, place.positions_m)
+            lines = columns_or_rows(surface, path, places_m)
             readings = replace(readings, group=lines[owner])
         used = np.ones(len(readings), dtype=bool)
         return Experiment(name, surface, path, readings, points, readings, used, **known)

@@ -53,7 +53,7 @@ def unit_in_doubt(surface: Surface, readings: Readings) -> str:
     units = [
         unit
         for factor, unit in {10.0: 'cm', 25.4: 'inch'}.items()
-        if surface.locate(factor * places_m).distance_m.max() < MAX_DISTANCE_M
+        if surface.locate(factor * places_m)[2].max() < MAX_DISTANCE_M
     ]
     if not units:
         return ''
@@ -84,8 +84,8 @@ def _hint(surface: Surface, positions_m: np.ndarray) -> str:
     for factor, words in OTHER_UNITS.items():
         if _fits(surface, factor * positions_m):
             return f'{boxes}; {words}'
-    distance = surface.locate(positions_m).distance_m
-    if np.median(distance) < NEAR_M:
+    *_, distance_m = surface.locate(positions_m)
+    if np.median(distance_m) < NEAR_M:
         return f'{boxes}; most points lie on the part: check these'
     sides, part = (np.sort(np.ptp(each, axis=0)) for each in (positions_m, vertices))
     # Boxes whose sides agree this well are the same part at another place.
@@ -100,7 +100,8 @@ def _fits(surface: Surface, positions_m: np.ndarray) -> bool:
     # Readings span at least this share of the part's longest side, or a spot of it was measured.
     if span < 0.1 * np.ptp(surface.vertices_m, axis=0).max():
         return False
-    return bool(np.median(surface.locate(positions_m).distance_m) < NEAR_M)
+    *_, distance_m = surface.locate(positions_m)
+    return bool(np.median(distance_m) < NEAR_M)
 
 
 FEWEST_ON_A_LINE = 3
