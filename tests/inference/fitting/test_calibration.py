@@ -58,10 +58,10 @@ def test_three_gaussians_forgive_gross_errors(panel):
     measured[[5, 20]] += 12.0
     robust = fit_collapse(seen, measured, np.full(len(measured), 0.3))
     x = np.linspace(-0.5, 0.5, 101)
-    difference = robust.collapse.thickness_um(x) - clean.collapse.thickness_um(x)
-    assert np.abs(difference).max() < 0.05 * clean.collapse.thickness_um(x).max()
+    difference = robust.thickness_um(x) - clean.thickness_um(x)
+    assert np.abs(difference).max() < 0.05 * clean.thickness_um(x).max()
     expected = sampled_collapse(TRUTH, 0.15).area_um_m
-    assert clean.collapse.area_um_m == pytest.approx(expected, rel=0.02)
+    assert clean.area_um_m == pytest.approx(expected, rel=0.02)
 
 
 def test_true_values_lie_in_their_intervals(panel):

@@ -22,7 +22,7 @@ from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.plausibility import FEWEST_POINTS
-from paint_deposition.inference.readings.readings import Readings, Residuals
+from paint_deposition.inference.readings.readings import Readings, root_mean_square
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.motion.trajectory import ONLY_BRUSH
@@ -95,6 +95,22 @@ class Panel:
         away = self.across_m[:, np.newaxis] - self.passes_m
         return np.where(self.mirrored, -away, away)
 
+    def film_um(self, collapse: ThreeGaussianCollapse) -> np.ndarray:
+        """(P,) film of all passes at the points, eq. (3) being that of the first one [um]."""
+        faster = self.speed_m_per_s[0] / self.speed_m_per_s
+        return (collapse.thickness_um(self.places_m) * faster).sum(axis=1)
+
+    def figures(self, collapse: ThreeGaussianCollapse, measured_um: np.ndarray) -> dict[str, Any]:
+        """Eq. (3), and eq. (5) for it at the panel's own index if it has one, beside (P,) [um]."""
+        index = self.scale_m if len(self.passes_m) > 1 else None
+        return {
+            **collapse.model_dump(),
+            'index_m': index,
+            'sigma_n': index and ParallelPasses.one_way(collapse).sigma_n(index),
+            'rmse_um': root_mean_square(measured_um - self.film_um(collapse)),
+            'speed_m_per_s': float(self.speed_m_per_s[0]),
+        }
+
 
 def check_panel(
     readings: Readings, panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray
@@ -127,28 +143,10 @@ def check_panel(
         )
 
 
-@dataclass(frozen=True)
-class PanelFit:
-    """The one-dimensional fit of a panel."""
-
-    panel: Panel  # where its points lie
-    collapse: ThreeGaussianCollapse  # eq. (3) for the first pass's speed
-    residuals: Residuals  # of the P points, with the film of all passes as the prediction
-
-    def to_dict(self) -> dict[str, Any]:
-        """Eq. (3), and eq. (5) for it at the panel's own index if it has one."""
-        index = self.panel.scale_m if len(self.panel.passes_m) > 1 else None
-        return {
-            **self.collapse.model_dump(),
-            'index_m': index,
-            'sigma_n': index and ParallelPasses.one_way(self.collapse).sigma_n(index),
-            'rmse_um': self.residuals.rmse_um,
-            'speed_m_per_s': float(self.panel.speed_m_per_s[0]),
-        }
-
-
-def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) -> PanelFit:
-    """Fit eq. (3), summed over the passes, with a loss that is robust against gross errors.
+def fit_collapse(
+    panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray
+) -> ThreeGaussianCollapse:
+    """Fit eq. (3) of the first pass, summed over all, by a loss that forgives gross errors.
 
     Args:
         panel: where points and passes lie.
@@ -181,12 +179,11 @@ def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) ->
     best = min(found, key=lambda result: result.cost).x
     gain = best[:3] * area * scale
     sigma = np.exp(best[5:]) * scale
-    collapse = ThreeGaussianCollapse(
+    return ThreeGaussianCollapse(
         K1_um_m=gain[0], K2_um_m=gain[1], K3_um_m=gain[2],
         r1_m=best[3] * scale, r2_m=best[4] * scale,
         sigma1_m=sigma[0], sigma2_m=sigma[1], sigma3_m=sigma[2],
     )  # fmt: skip
-    return PanelFit(panel, collapse, Residuals(measured_um, film(best), sigma_um))
 
 
 # Readings reach an edge of the pattern beyond which no more of a pass's paint lands than this.
