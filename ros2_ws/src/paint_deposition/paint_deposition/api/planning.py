@@ -206,29 +206,34 @@ def improve(
             '(--tool-axis) and where the part stands (--part-pose), paint inspect draws both'
         )
     sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
-    if sought.target_um is None:
-        mean_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])
-        sought = replace(sought, target_um=mean_um, elsewhere_um=mean_um)
+    target_um = sought.target_um
+    if target_um is None:
+        target_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])
+        sought = replace(sought, target_um=target_um, elsewhere_um=target_um)
     models = [model]
     if posterior is not None:
         models += draw_models(model, posterior, 8, seed)
-    retiming = retime_for_evenness(surface, sought, original, models, request, progress)
+    programme, binding, limits, of_path = retime_for_evenness(
+        surface, sought, original, models, request, progress
+    )
     drive = None
     if robot:
-        drive = robot.drive(retiming.programme.trajectory(), free_roll=False, begin=begin)
-        retiming = replace(retiming, programme=Programme.of(drive.trajectory))
-    moves = moves_of(retiming.programme, request)
+        drive = robot.drive(programme.trajectory(), free_roll=False, begin=begin)
+        programme = Programme.of(drive.trajectory)
+    moves = moves_of(programme, request)
     progress('the film as it will be', 0.0)
-    improved = retiming.programme.trajectory()
+    improved = programme.trajectory()
     new_um, new_paint = simulated(surface, model, improved)
     program_um, _ = simulated(surface, model, timed(moves, gun_known=True))
     tolerance = request.tolerance or DEFAULT_TOLERANCE
     before = LaidFilm.of(surface, sought, trajectory, film_um, paint, tolerance)
     after = LaidFilm.of(surface, sought, improved, new_um, new_paint, tolerance)
     return Improvement(
-        surface, sought, model, request, improved, moves, retiming, before,
-        after, float(np.abs(program_um - new_um).max() / new_um.max()),
-        (*seen.trajectory.warnings, *seen.geometry.warnings), drive,
+        surface, sought, model, request, improved, moves, original, programme, target_um,
+        binding=binding, binding_limits=limits, sigma_n_of_path=min(of_path, after.sigma_n),
+        before=before, after=after,
+        program_difference=float(np.abs(program_um - new_um).max() / new_um.max()),
+        geometry_warnings=(*seen.trajectory.warnings, *seen.geometry.warnings), drive=drive,
     )  # fmt: skip
 
 
