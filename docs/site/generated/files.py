@@ -22,7 +22,7 @@ from paint_deposition.files.tables.gauge_formats import (
     OWN,
 )
 from paint_deposition.files.zones_file import ZoneEntry
-from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
+from paint_deposition.model.eq1_pattern import BrushEntry, PlanarPattern
 from paint_deposition.request import MotionOptions, OnePart, range_end
 
 MOTION = set(MotionOptions.model_fields)
@@ -47,7 +47,7 @@ def text() -> str:
         MODEL,
         '### `planar`\n', _keys(PlanarPattern),
         '### `projection`\n', _keys(model_file.ProjectionSection),
-        '### A brush of `brushes`\n', 'Also `planar`.\n', _keys(SetPoints),
+        '### A brush of `brushes`\n', _keys(BrushEntry),
         '## Campaign\n', _keys(campaign_file._File),
         '### An experiment of `experiments`\n',
         f'Also the keys of [a motion](#a-motion) and of [a part](#a-part), {_listed(TARGET)}.\n',
