@@ -15,7 +15,6 @@ import tempfile
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import fields
 from functools import partial
 from pathlib import Path
 
@@ -85,8 +84,8 @@ def set_constants(settings: Sequence[str]) -> None:
     importlib.import_module('paint_deposition.inference.diagnosis.procedure')
     for setting in settings:
         name, _, value = setting.partition('=')
-        if name in (f'PRIOR.{field.name}' for field in fields(PRIOR)):
-            object.__setattr__(PRIOR, name.removeprefix('PRIOR.'), ast.literal_eval(value))
+        if name in (f'PRIOR.{one}' for one in vars(PRIOR)):
+            setattr(PRIOR, name.removeprefix('PRIOR.'), ast.literal_eval(value))
             continue
         owners = [
             module
