@@ -13,7 +13,7 @@ from booth import LOOKING_ALONG_Y
 from brushes import switched
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.library.trigger_lag import TriggerLag
-from paint_deposition.errors import PaintError, PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.model.eq1_pattern import PATTERN, PlanarPattern
@@ -163,7 +163,7 @@ def test_no_weights_reach_below_the_most_even_film_of_the_path(panel, even, leve
     ],
 )
 def test_impossible_limits_are_named(panel, even, wanted, words):
-    with pytest.raises(PlanError, match=words):
+    with pytest.raises(PaintError, match=words):
         pd.improve(panel, even.trajectory, NARROW, **wanted)
 
 
@@ -219,7 +219,7 @@ def test_a_short_pass_is_a_change_and_a_gun_that_looks_along_the_part_is_refused
     assert [change.number for change in found.changes] == [1]
     assert write_improvement_picture(tmp_path / 'improvement.png', found).exists()
     aside = Rotation.from_euler('z', -80.0, degrees=True) * Rotation.from_quat(LOOKING_ALONG_Y)
-    with pytest.raises(PlanError, match='nowhere does the gun face what it paints'):
+    with pytest.raises(PaintError, match='nowhere does the gun face what it paints'):
         pd.improve(small, over(aside.as_quat(), -0.04), NARROW)
 
 

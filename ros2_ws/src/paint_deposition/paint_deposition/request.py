@@ -23,7 +23,7 @@ from pydantic import (
 )
 from pydantic.fields import FieldInfo
 
-from paint_deposition.errors import PaintError, PlanError, did_you_mean, quoted
+from paint_deposition.errors import PaintError, did_you_mean, quoted
 
 Verb = TypeVar('Verb', bound=Callable)
 Made = TypeVar('Made', bound=BaseModel)
@@ -49,7 +49,7 @@ class Request(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
-    error_class: ClassVar[type[PaintError]] = PlanError
+    error_class: ClassVar[type[PaintError]] = PaintError
 
     def __init__(self, **values: Any) -> None:
         try:

@@ -10,7 +10,7 @@ import numpy as np
 
 from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.inference.fitting.parameters import Posterior
@@ -59,7 +59,7 @@ def recommend(model: DepositionModel | None = None, **wanted: Any) -> Recommenda
             ``target_um`` at least.
 
     Raises:
-        PlanError: the request has no answer; says why and what comes closest.
+        PaintError: the request has no answer; says why and what comes closest.
     """
     return recommended(model or DepositionModel(), IndexRequest(**wanted))
 
@@ -92,8 +92,8 @@ def plan(
             ``target_um`` at least, or zones.
 
     Raises:
-        PlanError: the request has no answer, or the gun touches the part; says why and what comes
-            closest. PaintError: a zone has no vertex of the part.
+        PaintError: the request has no answer, the gun touches the part, or a zone has no vertex of
+            it; says why and what comes closest.
     """
     request, on_part = _with_zones(surface, zones, wanted)
     unoptimised = planned(
@@ -125,7 +125,7 @@ def plan_faces(
         face_angle_deg: greatest angle between a normal of a face and its mean [deg].
 
     Raises:
-        PlanError: the request has no answer; says why and what comes closest.
+        PaintError: the request has no answer; says why and what comes closest.
     """
     request, on_part = _with_zones(surface, zones, wanted)
     envelope = envelope or GunEnvelope()
@@ -176,8 +176,8 @@ def improve(
         wanted: the fields of ``planning.requests.ImproveRequest``.
 
     Raises:
-        RecordingError: the motion cannot be used. PlanError: the limits leave no motion.
-        PaintError: a zone has no vertex of the part.
+        RecordingError: the motion cannot be used.
+        PaintError: the limits leave no motion, or a zone has no vertex of the part.
     """
     model = model or DepositionModel()
     request = ImproveRequest(**wanted)
@@ -201,7 +201,7 @@ def improve(
         if (length := np.linalg.norm(towards)) >= 0.9:
             target_region &= painted_side(surface, towards / length)
     if not target_region.any():
-        raise PlanError(
+        raise PaintError(
             f'{trajectory.source}: nowhere does the gun face what it paints; check its axis '
             '(--tool-axis) and where the part stands (--part-pose), paint inspect draws both'
         )
@@ -258,11 +258,11 @@ def read_robot(
         PaintError: the file cannot be read, or a joint has no greatest speed.
     """
     if not is_pose(part_pose):
-        raise PlanError(f'part_pose is {list(part_pose)}; give {POSE_FORMAT}')
+        raise PaintError(f'part_pose is {list(part_pose)}; give {POSE_FORMAT}')
     arm = Robot.read(Path(urdf), tip_link, base_link).arm
     unknown = np.array(arm.joints)[np.isinf(arm.fastest)]
     if len(unknown):
-        raise PlanError(
+        raise PaintError(
             f'the URDF has no greatest speed of {" ".join(unknown)}; give each a limit, as '
             '<limit lower="-3" upper="3" effort="0" velocity="2"/>'
         )

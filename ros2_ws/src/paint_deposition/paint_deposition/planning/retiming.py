@@ -46,7 +46,7 @@ def retime_for_evenness(
         smoothness.
 
     Raises:
-        PlanError: the limits contradict each other.
+        PaintError: the limits contradict each other.
     """
     rows = np.flatnonzero(wanted.region)
     rows = rows[stratified_sample(surface.vertex_areas_m2[wanted.region])]
