@@ -241,13 +241,12 @@ def test_each_coat_has_a_column_its_figures_and_its_wet_film(folder, tmp_path):
     assert figures['paint']['mean_wet_film_um'] == pytest.approx(figures['mean_um'] / share)
 
 
-@pytest.mark.parametrize(
-    ('said', 'of_all'), [({}, False), ({'wet_on_wet': True}, False), ({}, True)]
-)
-def test_a_campaign_predicts_each_layer_as_simulate_does(folder, said, of_all):
+@pytest.mark.parametrize('wet_by', ['none', 'coat', 'experiment'])
+def test_a_campaign_predicts_each_layer_as_simulate_does(folder, wet_by):
     model = pd.DepositionModel().with_effect(Sag(run_m=0.01))
-    taken_um = write_readings(folder, model, LAYERS, wet_on_wet=bool(said) or of_all)
-    read = pd.read_campaign(coated(folder, ({}, said), wet_on_wet=of_all))
+    taken_um = write_readings(folder, model, LAYERS, wet_on_wet=wet_by != 'none')
+    said = ({}, {'wet_on_wet': True}) if wet_by == 'coat' else ({}, {})
+    read = pd.read_campaign(coated(folder, said, wet_on_wet=wet_by == 'experiment'))
     assert [one.name for one in read.experiments] == [
         f'panel: {x}' for x in (*LAYERS[:2], 'total')
     ]
