@@ -36,8 +36,7 @@ def test_the_side_that_the_normal_agrees_with_wins_and_one_that_none_does_shows_
     np.testing.assert_allclose(back.normals, [[0.0, 1.0, 0.0]], atol=1e-12)
     beside = np.array([[0.0, 1.0, 0.0]])
     _, outward, distance_m = refined(flat, 0.05).locate(0.01 * beside, normals=beside)
-    assert angles_rad(outward, beside) == pytest.approx(np.pi)
-    assert distance_m == pytest.approx(0.01)
+    assert (*angles_rad(outward, beside), *distance_m) == pytest.approx((np.pi, 0.01))
 
 
 def test_a_standing_part_has_z_up_and_a_lying_one_y():
