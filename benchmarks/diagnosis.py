@@ -15,7 +15,6 @@ import tempfile
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import fields
 from functools import partial
 from pathlib import Path
 
@@ -85,8 +84,8 @@ def set_constants(settings: Sequence[str]) -> None:
     importlib.import_module('paint_deposition.inference.diagnosis.procedure')
     for setting in settings:
         name, _, value = setting.partition('=')
-        if name in (f'PRIOR.{field.name}' for field in fields(PRIOR)):
-            object.__setattr__(PRIOR, name.removeprefix('PRIOR.'), ast.literal_eval(value))
+        if name in (f'PRIOR.{one}' for one in vars(PRIOR)):
+            setattr(PRIOR, name.removeprefix('PRIOR.'), ast.literal_eval(value))
             continue
         owners = [
             module
@@ -160,14 +159,14 @@ def unseen_error(painted: Painted, campaign: Campaign, unseen: Campaign, model) 
         predicted, there = read_um[own], there_um[other]
         sigma = float(np.median(part.unseen_sigma_um))
         columns = np.column_stack([painted.level * predicted, np.full(own.sum(), painted.zero_um)])
-        rest = campaign.means.mean_um[own] - predicted
+        rest = campaign.readings.mean_um[own] - predicted
         away = np.abs(rest - np.median(rest))
         sound = away <= TYPING_ERROR * np.median(away)
         rest, columns = rest[sound], columns[sound]
         inner = sigma**2 * np.eye(2) + columns.T @ columns
         level, zero = np.linalg.solve(inner, columns.T @ rest)
         shown = there * (1.0 + painted.level * level) + painted.zero_um * zero
-        squares.append((unseen.means.mean_um[other] - shown) ** 2)
+        squares.append((unseen.readings.mean_um[other] - shown) ** 2)
         noise.append(part.unseen_sigma_um**2)
     return float(np.sqrt(1.0 + np.mean(np.concatenate(squares)) / np.mean(np.concatenate(noise))))
 

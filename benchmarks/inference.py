@@ -28,7 +28,7 @@ from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.search import Search
 from paint_deposition.inference.diagnosis.state import DiagnosisState
-from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.fitting.forward import Forward, derivatives_by_pattern
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.kernel.blocks import THREADS
 
@@ -84,7 +84,9 @@ def films(campaign: Campaign, rounds: int) -> None:
             other = model.planar.model_copy(update={'K1_cm3_per_s': gain})
             moved = model.model_copy(update={'planar': other})
             film.of(lambda moved=moved: forward.predict_um(moved))
-            terms.of(lambda moved=moved: forward.terms(moved).derivatives_um())
+            terms.of(lambda moved=moved: derivatives_by_pattern(
+                forward.of_weights(moved), moved.patterns
+            ))  # fmt: skip
         for what, stage in ((f'film{name}', film), (f'derivatives{name}', terms)):
             print(
                 f'{what:53}{1e3 * stage.wall_s:6.2f} ms{1e3 * stage.processor_s:8.2f} ms'

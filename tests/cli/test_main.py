@@ -22,7 +22,7 @@ from paint_deposition.cli import results, samples
 from paint_deposition.cli.main import COMMANDS
 from paint_deposition.cli.main import paint as group
 from paint_deposition.cli.results import progress
-from paint_deposition.request import FilmBand, MotionOptions, OnePart
+from paint_deposition.request import MotionOptions, OnePart
 from waiting import until
 
 
@@ -161,7 +161,7 @@ def test_help_and_the_verb_show_the_fields_of_a_request():
     assert shown['direction'].default == 'horizontal'
 
 
-@pytest.mark.parametrize('kind', [MotionOptions, OnePart, FilmBand])
+@pytest.mark.parametrize('kind', [MotionOptions, OnePart])
 def test_options_are_the_keys_of_files_in_the_same_words(kind):
     command = group.get_command(click.Context(group), 'simulate')
     helps = {option.name: option.help for option in command.params if option.name}

@@ -197,7 +197,7 @@ def test_points_are_written_for_people_and_robots(tmp_path):
         writer.writerows(row | {'thickness_um': row['expected_um']} for row in rows)
     readings = pd.read_readings(path, surface=surface)
     assert (len(readings), len(set(readings.point))) == (38, 30)
-    assert surface.locate(readings.positions_m).distance_m.max() < 1e-3
+    assert surface.locate(readings.positions_m)[2].max() < 1e-3
 
 
 @pytest.mark.slow

@@ -26,6 +26,7 @@ from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.film.layout import term_weights
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.model.eq1_pattern import Brush, PlanarPattern
 from scenes import stamps_ns, straight_pass
@@ -240,18 +241,20 @@ def test_each_coat_has_a_column_its_figures_and_its_wet_film(folder, tmp_path):
     assert figures['paint']['mean_wet_film_um'] == pytest.approx(figures['mean_um'] / share)
 
 
-@pytest.mark.parametrize('wet_on_wet', [False, True])
-def test_a_campaign_predicts_each_layer_as_simulate_does(folder, wet_on_wet):
+@pytest.mark.parametrize('wet_by', ['none', 'coat', 'experiment'])
+def test_a_campaign_predicts_each_layer_as_simulate_does(folder, wet_by):
     model = pd.DepositionModel().with_effect(Sag(run_m=0.01))
-    taken_um = write_readings(folder, model, LAYERS, wet_on_wet=wet_on_wet)
-    read = pd.read_campaign(coated(folder, ({}, {'wet_on_wet': wet_on_wet})))
+    taken_um = write_readings(folder, model, LAYERS, wet_on_wet=wet_by != 'none')
+    said = ({}, {'wet_on_wet': True}) if wet_by == 'coat' else ({}, {})
+    read = pd.read_campaign(coated(folder, said, wet_on_wet=wet_by == 'experiment'))
     assert [one.name for one in read.experiments] == [
         f'panel: {x}' for x in (*LAYERS[:2], 'total')
     ]
-    predicted_um = Forward(read).predict_um(model)[read.means.owner]
+    predicted_um = Forward(read).predict_um(model)[read.readings.owner]
     assert predicted_um == pytest.approx(taken_um, abs=1e-5)
-    terms_um = Forward(read, model.effects).terms(model).with_gains_um(model.patterns)
-    assert terms_um[read.means.owner] == pytest.approx(taken_um, abs=1e-5)
+    weights, _ = term_weights(model.planar)
+    weighted_um = Forward(read, model.effects).of_weights(model)(weights)
+    assert weighted_um[read.readings.owner] == pytest.approx(taken_um, abs=1e-5)
 
 
 def test_wet_readings_are_dried_by_the_solids_of_their_coat(folder):

@@ -7,7 +7,7 @@ import pytest
 
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.film.pass_film import collapse_um, pass_film_um, sampled_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
@@ -104,7 +104,7 @@ def test_sampled_collapse_is_the_collapse(name):
 def test_impossible_passes_are_refused(speed, standoff, offset, remedy):
     model = DepositionModel(projection=Projection(emission_offset_m=offset))
     for one in (model, model.with_effect(EFFECTS['gun_wake'].typical())):
-        with pytest.raises(PlanError, match=remedy):
+        with pytest.raises(PaintError, match=remedy):
             collapse_um(one, ACROSS_M, speed, standoff)
-        with pytest.raises(PlanError, match=remedy):
+        with pytest.raises(PaintError, match=remedy):
             sampled_collapse(one, speed, standoff_m=standoff)

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from trimesh.creation import box, icosphere
 
-from paint_deposition.part.points import across_axis, downhill_axis
+from paint_deposition.part.points import across_axis, angles_rad, downhill_axis
 from paint_deposition.part.surface import Surface
 from surfaces import ball, cylinder, flat, fold, refined, triangulated
 
@@ -16,7 +16,7 @@ from surfaces import ball, cylinder, flat, fold, refined, triangulated
 def test_agrees_with_every_triangle_tried():
     surface = refined(lambda x, z: 0.05 * np.sin(20 * x) * np.cos(15 * z), 0.03, jitter=0.3)
     points = np.random.default_rng(1).uniform([-0.3, -0.2, -0.3], [0.3, 0.2, 0.3], (40, 3))
-    found = surface.locate(points).distance_m
+    *_, found = surface.locate(points)
     from trimesh.triangles import closest_point
 
     corners = surface.vertices_m[surface.faces]
@@ -34,9 +34,9 @@ def test_the_side_that_the_normal_agrees_with_wins_and_one_that_none_does_shows_
     np.testing.assert_allclose(front.positions_m, [[0.03, -0.001, 0.02]], atol=1e-12)
     np.testing.assert_allclose(back.positions_m, [[0.03, 0.001, 0.02]], atol=1e-12)
     np.testing.assert_allclose(back.normals, [[0.0, 1.0, 0.0]], atol=1e-12)
-    place = refined(flat, 0.05).locate([[0.0, 0.01, 0.0]], normals=[[0.0, 1.0, 0.0]])
-    assert place.angle_rad[0] == pytest.approx(np.pi)
-    assert place.distance_m[0] == pytest.approx(0.01)
+    beside = np.array([[0.0, 1.0, 0.0]])
+    _, outward, distance_m = refined(flat, 0.05).locate(0.01 * beside, normals=beside)
+    assert (*angles_rad(outward, beside), *distance_m) == pytest.approx((np.pi, 0.01))
 
 
 def test_a_standing_part_has_z_up_and_a_lying_one_y():

@@ -14,7 +14,7 @@ import paint_deposition as pd
 import robot_arm
 from cli.command import paint
 from paint_deposition.api.planning import read_robot
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.transforms import Rigid, at_part, moved
@@ -171,7 +171,7 @@ def test_a_configuration_once_chosen_is_kept(planned, cell):
     place, turn = cell.poses(planned.trajectory, np.zeros(1))
     found = starts(cell.arm, place[0], turn[0].as_matrix(), False)
     other = next(one for one in found if np.abs(one[0] - chosen[0]).max() > 1.0)
-    with pytest.raises(PlanError, match='in none of 1 configurations'):
+    with pytest.raises(PaintError, match='in none of 1 configurations'):
         cell.drive(planned.trajectory, False, other)
 
 
@@ -181,11 +181,11 @@ def test_what_cannot_be_driven_says_where_and_a_robot_without_speeds_is_refused(
     for x_m, y_m, words in ((5.0, 0.0, 'does not reach the first pose'),
                             (1.2, 0.2, 'follows the motion to')):  # fmt: skip
         part = Rigid.of([x_m, y_m, *PART_POSE[2:]])
-        with pytest.raises(PlanError, match=words):
+        with pytest.raises(PaintError, match=words):
             replace(cell, part=part).drive(planned.trajectory, free_roll=False)
     unknown = tmp_path / 'unknown.urdf'
     unknown.write_text(robot_arm.URDF.read_text().replace(' velocity="1"', '', 1))
-    with pytest.raises(PlanError, match='no greatest speed of shoulder_pan'):
+    with pytest.raises(PaintError, match='no greatest speed of shoulder_pan'):
         read_robot(unknown, PART_POSE)
     with pytest.raises(pd.PaintError, match='give seven numbers'):
         read_robot(robot_arm.URDF, [1.0, 2.0])

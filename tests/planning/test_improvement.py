@@ -13,7 +13,7 @@ from booth import LOOKING_ALONG_Y
 from brushes import switched
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.library.trigger_lag import TriggerLag
-from paint_deposition.errors import PaintError, PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.model.eq1_pattern import PATTERN, PlanarPattern
@@ -130,7 +130,7 @@ def test_the_written_motion_keeps_the_limits_and_names_those_that_cost(panel, ev
     legs_m = [b.position_m - a.position_m for a, b in pairwise(held.moves) if b.spraying]
     assert np.linalg.norm(legs_m, axis=1).min() > 0.02 * (1.0 - 1e-3)
     assert levelled.after.sigma_n < held.after.sigma_n < held.before.sigma_n
-    assert 'speed' in ' '.join(held.retiming.binding_limits)
+    assert 'speed' in ' '.join(held.binding_limits)
     assert any(line.startswith('limited by the') for line in held.limit_sentences)
 
 
@@ -138,7 +138,7 @@ def test_the_written_motion_keeps_the_limits_and_names_those_that_cost(panel, ev
 def test_a_mean_that_the_limits_do_not_allow_is_warned_of(panel, even):
     """The programme runs at 0.3 m/s: slower than 0.24 it lays a quarter more."""
     slow = pd.improve(panel, even.trajectory, NARROW, speed_max_m_per_s=0.24)
-    assert slow.after.mean_um > 1.1 * slow.retiming.target_um
+    assert slow.after.mean_um > 1.1 * slow.target_um
     (warning,) = slow.warnings
     assert 'the greatest speed' in warning
     assert 'allow a greater speed (--speed-max) or a lower flow (--flow)' in warning
@@ -163,7 +163,7 @@ def test_no_weights_reach_below_the_most_even_film_of_the_path(panel, even, leve
     ],
 )
 def test_impossible_limits_are_named(panel, even, wanted, words):
-    with pytest.raises(PlanError, match=words):
+    with pytest.raises(PaintError, match=words):
         pd.improve(panel, even.trajectory, NARROW, **wanted)
 
 
@@ -219,7 +219,7 @@ def test_a_short_pass_is_a_change_and_a_gun_that_looks_along_the_part_is_refused
     assert [change.number for change in found.changes] == [1]
     assert write_improvement_picture(tmp_path / 'improvement.png', found).exists()
     aside = Rotation.from_euler('z', -80.0, degrees=True) * Rotation.from_quat(LOOKING_ALONG_Y)
-    with pytest.raises(PlanError, match='nowhere does the gun face what it paints'):
+    with pytest.raises(PaintError, match='nowhere does the gun face what it paints'):
         pd.improve(small, over(aside.as_quat(), -0.04), NARROW)
 
 
@@ -237,7 +237,7 @@ def test_the_gun_is_closed_in_turns_beside_the_part(panel):
     assert np.abs(sprayed[:, 2]).max() < 0.11
     assert np.abs(np.abs(sprayed[:, 2]) - 0.1).max() < 0.01
     assert closed.after.paint.emitted_cm3 < 0.9 * kept.after.paint.emitted_cm3
-    assert closed.retiming.target_um == pytest.approx(closed.before.mean_um, rel=1e-3)
+    assert closed.target_um == pytest.approx(closed.before.mean_um, rel=1e-3)
     assert [change.number for change in closed.changes] == [1, 2]
     assert np.unique(path.spray_pass[path.flow > 0.0]).tolist() == [0, 1]
     assert 'earlier' not in ''.join(change.sentence for change in closed.changes)

@@ -8,7 +8,7 @@ import pytest
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.planning.placement import lines_of, passes_to_cover, place_passes
 from paint_deposition.planning.plan import plan
@@ -110,7 +110,7 @@ def test_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it_or_run_downward
     ],
 )
 def test_impossible_plans_say_why(bowed, what, words):
-    line = refusal(PlanError, pd.plan, bowed, NARROW, **({'speed_m_per_s': 0.3} | what))
+    line = refusal(PaintError, pd.plan, bowed, NARROW, **({'speed_m_per_s': 0.3} | what))
     assert re.search(words, line), line
 
 
@@ -118,7 +118,7 @@ def test_the_tolerance_is_that_of_the_film_with_all_effects(bowed):
     asked = {'speed_m_per_s': 0.3, 'index_m': 0.3}
     allowed = pd.plan(bowed, NARROW, **asked).sigma_n + 0.01
     rimmed = NARROW.with_effect(EFFECTS['edge_build'](gain=0.5))
-    with pytest.raises(PlanError, match=r'lay a film of sigma_n .* %, not within'):
+    with pytest.raises(PaintError, match=r'lay a film of sigma_n .* %, not within'):
         pd.plan(bowed, rimmed, tolerance=allowed, **asked)
 
 

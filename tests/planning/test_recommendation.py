@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from inference.fitting.panels import column, passes
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq3_collapse import SampledCollapse
@@ -177,5 +177,5 @@ def test_the_speed_for_a_target_keeps_its_limits():
     ],
 )
 def test_impossible_requests_say_why(what, words):
-    line = refusal(PlanError, recommended, **what)
+    line = refusal(PaintError, recommended, **what)
     assert re.search(words, line), line

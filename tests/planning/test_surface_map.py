@@ -9,7 +9,7 @@ from trimesh.creation import box
 
 import paint_deposition as pd
 from booth import panel, panel_with_screen, serpentine
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning import passes as gun_passes
 from paint_deposition.planning.passes import PassStyle, plan_pass, plan_passes, trajectory_of
@@ -61,10 +61,10 @@ def test_ends_of_a_slanted_part_follow_the_pass_and_impossible_parts_are_refused
     low, high = (np.ptp(surface_map.extent_near_m(z, 0.01)) for z in (0.4, -0.3))
     assert low > high + 0.4
     surface = sheet(lambda x, z: 0.0 * x)
-    with pytest.raises(PlanError, match='no surface faces the gun'):
+    with pytest.raises(PaintError, match='no surface faces the gun'):
         SurfaceMap(surface, pass_axes(surface, outward=(0.0, 1.0, 0.0)), 0.1)
     body = box()
-    with pytest.raises(PlanError, match='closed'):
+    with pytest.raises(PaintError, match='closed'):
         pass_axes(pd.Surface.from_triangles(body.vertices, np.asarray(body.faces), 0.5))
 
 
@@ -184,7 +184,8 @@ def test_a_screen_before_the_gun_is_met_while_it_passes_and_told_from_one_in_it(
 def test_a_plan_on_which_the_gun_touches_the_part_is_refused_and_one_too_near_says_so(tmp_path):
     """The gun's body reaches back from the TCP, 30 mm from the panel: the screen is in its way."""
     wanted = {'speed_m_per_s': 0.3, 'smoothing_radius_m': 0.3}
-    with pytest.raises(PlanError, match=r'the gun touches the part at .* give a greater standoff'):
+    touches = r'the gun touches the part at .* give a greater standoff'
+    with pytest.raises(PaintError, match=touches):
         pd.plan(panel_with_screen(), standoff_m=0.03, **wanted)
     reaching = pd.GunEnvelope(radius_m=0.04, before_m=0.2)
     kept = pd.plan(panel_with_screen(), envelope=reaching, **wanted)

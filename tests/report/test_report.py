@@ -17,7 +17,8 @@ from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.comparison.profiles import profiles_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.refit import refit
-from paint_deposition.inference.diagnosis.verdict import EffectClass, Interval
+from paint_deposition.inference.diagnosis.verdict import EffectClass
+from paint_deposition.inference.fitting.estimates import Estimate
 from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.report.data import ReportData, law_rows
 from paint_deposition.report.page import point_rows, report_html
@@ -173,7 +174,7 @@ def test_part_batch_and_target_of_the_campaign_lead_the_page(particular, diagnos
 def test_every_verdict_has_its_report(tell, diagnosis, comparisons, which):
     base = {'accepted': (), 'classes': (), 'history': diagnosis.history[:1]}
     drift, fog = (
-        EffectClass(members, 0.4, members[0], {name: Interval(0.01, 0.0, 0.02)})
+        EffectClass(members, 0.4, members[0], {name: Estimate('', 0.01, 0.005, 0.0, 0.02, True)})
         for members, name in (
             (('air_drift',), 'shift_down_m'), (('fog_gradient', 'tcp_tilt'), 'fog_um')
         )

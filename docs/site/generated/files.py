@@ -22,14 +22,14 @@ from paint_deposition.files.tables.gauge_formats import (
     OWN,
 )
 from paint_deposition.files.zones_file import ZoneEntry
-from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
+from paint_deposition.model.eq1_pattern import BrushEntry, PlanarPattern
 from paint_deposition.request import MotionOptions, OnePart, range_end
 
 MOTION = set(MotionOptions.model_fields)
 PART = set(OnePart.model_fields)
 # Keys that were explained before, in the order of the file.
 TARGET = ['target_um', 'tolerance_um']
-COAT = [k for k in campaign_coats.CoatEntry.model_fields if k not in MOTION | {'wet_on_wet'}]
+COAT = [key for key in campaign_coats.PaintJob.model_fields if key not in MOTION]
 BEGIN, END = '<!-- generated: files -->', '<!-- end of generated -->'
 MODEL = """
 A model has `planar` or `brushes` by their numbers, `projection`, a list of
@@ -47,14 +47,13 @@ def text() -> str:
         MODEL,
         '### `planar`\n', _keys(PlanarPattern),
         '### `projection`\n', _keys(model_file.ProjectionSection),
-        '### A brush of `brushes`\n', 'Also `planar`.\n', _keys(SetPoints),
+        '### A brush of `brushes`\n', _keys(BrushEntry),
         '## Campaign\n', _keys(campaign_file._File),
         '### An experiment of `experiments`\n',
         f'Also the keys of [a motion](#a-motion) and of [a part](#a-part), {_listed(TARGET)}.\n',
         _keys(campaign_file._Entry, without=MOTION.union(PART, TARGET)),
         '### A coat of `coats`\n',
-        f'Also the keys of [a motion](#a-motion), and of an experiment {_listed(COAT)}.\n',
-        _keys(campaign_coats.CoatEntry, without=MOTION.union(COAT)),
+        f'The keys of [a motion](#a-motion), and of an experiment {_listed(COAT)}.\n',
         '## Zones\n', 'Each of the list `zones`, see [zones](zones.md).\n', _keys(ZoneEntry),
         '## A motion\n', 'How a recording is read; for commands the same as options.\n',
         _keys(MotionOptions),

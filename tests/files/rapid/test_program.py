@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import refusals
-from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.rapid import program as rapid
 from paint_deposition.files.rapid.program import module_text, read_program
 from paint_deposition.motion.path_builder import spray_path
@@ -267,10 +267,10 @@ def test_what_is_written_is_read_back(tmp_path, paint_moves):
         assert (turns[0].inv() * turns[1]).magnitude() < 1e-6
         assert again.speed_m_per_s == pytest.approx(planned.speed_m_per_s, abs=1e-6)
         assert again.switches == ()
-    with pytest.raises(PlanError, match='flows of single passes need brushes of their own'):
+    with pytest.raises(PaintError, match='flows of single passes need brushes of their own'):
         module_text([replace(move, flow=0.8) for move in moves], paint_moves=True)
     for no_speed in (0.0, 10.0):
-        with pytest.raises(PlanError, match=f'speed of {no_speed:g} m/s: give one above 0'):
+        with pytest.raises(PaintError, match=f'speed of {no_speed:g} m/s: give one above 0'):
             module_text([replace(moves[0], speed_m_per_s=no_speed)])
 
 

@@ -51,7 +51,7 @@ def test_a_planted_misfit_is_found_and_told(study):
     assert 'upper third' in found.description
     assert 'lower third' not in found.description
     assert 'µm low' in found.description  # measured more: the model is low
-    assert found.readings == door.means.repeats[found.rows - np.argmax(on_door)].sum()
+    assert found.readings == door.readings.repeats[found.rows - np.argmax(on_door)].sum()
 
 
 @pytest.mark.parametrize(('side', 'from_left'), [(1.0, 98), (-1.0, 0)])

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.design import next_experiment
-from paint_deposition.inference.design.contenders import Forecast, Placement, contenders_of
+from paint_deposition.inference.design.contenders import Forecast, contenders_of, one_by_one
 from paint_deposition.inference.design.sprays import MENU, together
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, Step, Unknown
@@ -187,11 +187,10 @@ def test_single_readings_add_up_to_all_of_them(spread, alike, tolerance):
     told = forecast(spread)
     if alike:
         told = replace(told, factors=np.tile(told.factors[0], (3, 1, 1)))
-    placement = Placement(told)
-    for reading in range(READINGS):
-        placement.take(reading)
-    found = placement.separation(placement.nearest())
-    assert found == pytest.approx(told.separations[1], rel=tolerance)
+    usable = np.ones(READINGS, dtype=bool)
+    for reading, _, (_, found) in one_by_one(told, usable):
+        usable[reading], reached = False, found
+    assert reached == pytest.approx(told.separations[1], rel=tolerance)
 
 
 def test_some_readings_are_predicted_from_others():

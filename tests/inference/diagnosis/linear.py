@@ -6,7 +6,7 @@ import numpy as np
 
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, Sensitivity
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
@@ -57,12 +57,9 @@ def null_of(fit: Fit, nuisance: np.ndarray | None = None) -> NullModel:
 
 
 def law(name: str, *columns: np.ndarray, side=1.0, share=1.0, **shape: float) -> Explanation:
-    """An effect by the directions (P,) of its first amplitudes, which are ten sizes wide."""
-    effect = EFFECTS[name](**shape)
-    names = effect.amplitudes()[: len(columns)]
-    low, high = (np.full(len(columns), end) for end in (-10.0 * (side == 0.0), 10.0))
-    found = Sensitivity(effect, names, np.column_stack(columns), low, high)
-    return Explanation(name, found.columns, found.sides, share, found)
+    """An effect by the directions (P,) of its amplitudes."""
+    sides = np.full(len(columns), side)
+    return Explanation(name, np.column_stack(columns), sides, share, EFFECTS[name](**shape))
 
 
 def unknown(columns: np.ndarray, share: float = 1.0) -> Explanation:

@@ -65,7 +65,7 @@ def found() -> list[Explanation]:
         return strength * random.normal(size=READINGS)
 
     return [
-        law('air_drift', direction(0.8), direction(0.8), side=0),
+        law('tcp_offset', direction(0.8), direction(0.8), side=0),
         *(law('corner_slowdown', direction(0.9), share=1 / 3, length_m=x) for x in LENGTHS_M),
         law('edge_build', direction(0.7)),
         law('faraday_shielding', direction(1.2)),
@@ -172,7 +172,7 @@ def test_a_planted_effect_is_proposed_with_its_shape_and_amplitude(plain, found,
     assert next(iter(space.alone)) == 'corner_slowdown'
     assert probability(space, 'corner_slowdown') > 0.95
     effect = space.by_law('corner_slowdown')
-    assert effect.length_m == planted.law.effect.length_m
+    assert effect.length_m == planted.law.length_m
     typical = type(effect).parameters()['gain']['typical']
     assert effect.gain / typical == pytest.approx(1.5, abs=0.35)
 
@@ -256,8 +256,8 @@ def test_a_detectable_amplitude_is_detected_nine_times_in_ten(freedom, plain, fo
     limit = np.quantile(space.evidence(space.null_draws(3)), 1.0 - proposals.LEVEL)
     noise = simulated(READINGS, freedom, POWER_RUNS, seed=6)
     for explanation in found[4:6]:
-        effect, (name,) = explanation.cause, explanation.law.names
-        typical = type(explanation.law.effect).parameters()[name]['typical']
+        effect, (name,) = explanation.cause, explanation.law.amplitudes()
+        typical = explanation.law.parameters()[name]['typical']
         change = detectable[effect][name] / typical * plain.whiten(explanation.columns)
         seen = np.count_nonzero(space.evidence(noise + change) > limit)
         low, high = binom.interval(1.0 - CHANCE, POWER_RUNS, proposals.POWER)

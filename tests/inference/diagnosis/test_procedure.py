@@ -50,7 +50,7 @@ def test_nothing_is_found_where_nothing_is_missing(clean):
     assert nothing_found.detectable.keys().isdisjoint(nothing_found.not_testable)
     assert set(nothing_found.detectable) | set(nothing_found.not_testable) == set(EFFECTS)
     misfits = nothing_found.comparisons[0].misfits
-    assert [m.label for m in misfits if m.kind == 'group'] == ['column 1']
+    assert [label for _, kind, label in misfits if kind == 'group'] == ['column 1']
     figures = nothing_found.discrepancy
     # The paint shop's sprays are even, and its footprint is that of eq. (1).
     assert 0.0 < figures.setting_share < 0.03
@@ -128,7 +128,7 @@ def test_an_effect_in_the_start_model_is_refitted_and_not_found_again(shielded):
 
 def test_a_few_readings_are_too_few_and_a_path_that_misses_the_part_is_told(clean):
     for points in (2, 11):
-        few = clean.with_readings(clean.readings.select(clean.means.owner < points))
+        few = clean.with_readings(clean.readings.select(clean.readings.owner < points))
         diagnosis = diagnose(pd.Campaign((few,)), BASE, {})
         assert diagnosis.verdict == 'fit_broken'
         assert f'{points} points cannot determine 7 parameters' in diagnosis.reason

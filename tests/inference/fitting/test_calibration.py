@@ -14,7 +14,7 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.film.pass_film import collapse_um, sampled_collapse
 from paint_deposition.inference.fitting.estimates import estimates
-from paint_deposition.inference.fitting.panel import Panel, fit_collapse, short_reaches
+from paint_deposition.inference.fitting.panel import Panel, fit_collapse, reach_of, short_reaches
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from virtual_paint_shop.files import write
@@ -47,21 +47,21 @@ def test_a_panel_is_seen_as_one_with_its_turned_passes(panel, turned):
         collapse_um(TRUTH, seen.across_m - line, speed, seen.distance_m, seen.travel_rad, turned=m)
         for line, speed, m in zip(seen.passes_m, seen.speed_m_per_s, seen.mirrored, strict=True)
     )
-    off_um = film_um - part.means.mean_um
+    off_um = film_um - part.readings.mean_um
     assert np.sqrt(np.mean(off_um**2)) < 0.3
-    assert (np.abs(part.means.mean_um - panel.means.mean_um).max() > 1.0) == turned
+    assert (np.abs(part.readings.mean_um - panel.readings.mean_um).max() > 1.0) == turned
 
 
 def test_three_gaussians_forgive_gross_errors(panel):
-    seen, measured = Panel.of(panel), panel.means.mean_um.copy()
+    seen, measured = Panel.of(panel), panel.readings.mean_um.copy()
     clean = fit_collapse(seen, measured, np.full(len(measured), 0.3))
     measured[[5, 20]] += 12.0
     robust = fit_collapse(seen, measured, np.full(len(measured), 0.3))
     x = np.linspace(-0.5, 0.5, 101)
-    difference = robust.collapse.thickness_um(x) - clean.collapse.thickness_um(x)
-    assert np.abs(difference).max() < 0.05 * clean.collapse.thickness_um(x).max()
+    difference = robust.thickness_um(x) - clean.thickness_um(x)
+    assert np.abs(difference).max() < 0.05 * clean.thickness_um(x).max()
     expected = sampled_collapse(TRUTH, 0.15).area_um_m
-    assert clean.collapse.area_um_m == pytest.approx(expected, rel=0.02)
+    assert clean.area_um_m == pytest.approx(expected, rel=0.02)
 
 
 def test_true_values_lie_in_their_intervals(panel):
@@ -78,7 +78,7 @@ def test_true_values_lie_in_their_intervals(panel):
 
 def test_a_pattern_that_no_bell_has_is_named_as_what_the_model_lacks(panel):
     """Fog that settles low looks like a ring as large as the panel."""
-    film_um, height_m = panel.means.mean_um, column()[:, 2]
+    film_um, height_m = panel.readings.mean_um, column()[:, 2]
     foggy = with_film(panel, film_um + 40.0 * np.exp(-height_m[: len(film_um)] / 0.4))
     calibrated = pd.calibrate(pd.Campaign((foggy,)))
     strange = [one for one in calibrated.parameters if 'no usual bell has' in one.reason]
@@ -135,7 +135,7 @@ SIX = slice(10, 16)
 
 
 def in_unit(panel, factor, rows=slice(None)):
-    film_um = panel.means.mean_um.copy()
+    film_um = panel.readings.mean_um.copy()
     film_um[rows] /= factor
     return with_film(panel, film_um)
 
@@ -143,12 +143,12 @@ def in_unit(panel, factor, rows=slice(None)):
 @pytest.mark.parametrize(
     ('made', 'words'),
     [
-        (lambda panel: with_film(panel, panel.means.mean_um[:6]),
+        (lambda panel: with_film(panel, panel.readings.mean_um[:6]),
          'readings at 6 points; .* measure at least 10'),
         (lambda _: painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)),
          'one side of the passes'),
         (lambda panel: with_film(panel, np.full(40, 20.0), 2, noise_um=0.7), 'no pattern in it'),
-        (lambda panel: with_film(panel, np.where(np.arange(40) == 7, -4.5, panel.means.mean_um)),
+        (lambda of: with_film(of, np.where(np.arange(40) == 7, -4.5, of.readings.mean_um)),
          "point 'P7' reads -4.5 µm; .* zero the gauge"),
         (lambda panel: in_unit(panel, 25.4), 'look like mil, say unit: {thickness: mil}'),
         (lambda panel: in_unit(panel, 1000.0), 'look like mm, say unit: {thickness: mm}'),
@@ -191,13 +191,13 @@ def test_paint_beyond_the_readings_is_that_of_the_normal_and_none_is_not_warned_
     gaussian = pd.DepositionModel(planar=PlanarPattern(K2=1.0, K3=0.0, sigma2_m=sigma_m))
     one_pass, ends = passes((1.0,)), ((0.8, 1.3), (0.6, 1.4))
     narrow, wide = (painted_by(gaussian, one_pass, column(*e), name=f'{e}') for e in ends)
-    (reach,) = short_reaches(pd.Campaign((narrow,)), gaussian)
-    assert sorted(reach.ends_m) == pytest.approx([0.2, 0.3], abs=1e-6)
-    expected = norm.sf(np.array(reach.ends_m) / sigma_m)
-    assert reach.beyond == pytest.approx(expected, rel=1e-3)
-    assert reach.needed_m == pytest.approx(norm.isf(0.025) * sigma_m, rel=1e-3)
+    ends_m, beyond, needed_m = reach_of(Panel.of(narrow), gaussian)
+    assert sorted(ends_m) == pytest.approx([0.2, 0.3], abs=1e-6)
+    assert beyond == pytest.approx(norm.sf(np.array(ends_m) / sigma_m), rel=1e-3)
+    assert needed_m == pytest.approx(norm.isf(0.025) * sigma_m, rel=1e-3)
+    assert [*short_reaches(pd.Campaign((narrow,)), gaussian)] == [0]
     for enough in ((wide,), (narrow, wide)):
-        assert short_reaches(pd.Campaign(enough), gaussian) == ()
+        assert short_reaches(pd.Campaign(enough), gaussian) == {}
     result = pd.calibrate(panel_campaign(1.4, (0.7,)))
     assert not any('lands further out' in warning for warning in result.warnings)
     assert len(result.shifts) == 0

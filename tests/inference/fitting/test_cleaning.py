@@ -89,11 +89,10 @@ def test_a_prediction_without_the_reading_is_that_of_the_others_alone():
     # Without covariates, whose scale would be that of the readings.
     misfit, row = replace(built_up(scattered(4)), covariates={}), 17
     others = np.delete(np.arange(COUNT), row)
-    whole, without = misfit.leave_one_out, misfit.select(others).leave_one_out
-    joint = np.logaddexp.reduce(whole.log_weight) - np.logaddexp.reduce(without.log_weight)
+    joint = misfit.log_likelihood - misfit.select(others).log_likelihood
     normal = -0.5 * np.log(2.0 * np.pi)
     # The smallest directions of a field, which are left out, are not quite those of all.
-    assert whole.log_density[row] == pytest.approx(joint + normal, abs=0.01)
+    assert misfit.log_density[row] == pytest.approx(joint + normal, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +110,7 @@ def test_what_was_probably_meant(written, expected, guess):
 @pytest.mark.parametrize('texture', [0.002, 0.02])
 def test_the_texture_is_estimated_beside_a_missing_effect(texture):
     misfits = [built_up(scattered(seed, texture)) for seed in range(12)]
-    shares = [misfit.leave_one_out.texture_share for misfit in misfits]
+    shares = [misfit.texture_share for misfit in misfits]
     assert np.mean(shares) == pytest.approx(texture, abs=0.006)
 
 
@@ -122,7 +121,7 @@ def test_a_typing_error_does_not_change_the_verdict(tmp_path):
         tmp_path, seed=5, truth='edge_build', amplitude=0.5, experiments=('door',),
         readings=97, repeats=20, style='random', parcels=2_000_000,
     ).experiments  # fmt: skip
-    row = int(np.flatnonzero(door.means.repeats[door.means.owner] == 1)[10])
+    row = int(np.flatnonzero(door.readings.repeats[door.readings.owner] == 1)[10])
     factor = np.where(np.arange(len(door.readings)) == row, 10.0, 1.0)
     bad = pd.Campaign((reading(door, factor * door.readings.thickness_um),))
     library = {name: EFFECTS[name] for name in ('air_drift', 'edge_build', 'faraday_shielding')}
@@ -175,7 +174,7 @@ def test_the_mean_of_a_cell_is_its_film_and_readings_by_hand_beside_a_scan_are_k
     sigma_um = cells.readings.sigma_um
     expected_um = NOISE_UM / np.sqrt(SCANNED / len(cells))
     assert np.median(sigma_um) == pytest.approx(expected_um, rel=0.1)
-    off_um = cells.means.mean_um - Forward(cells, ()).predict_um(MODEL)
+    off_um = cells.readings.mean_um - Forward(cells, ()).predict_um(MODEL)
     # Chi-square of that many cells: within five of its standard deviations.
     five_sd = 5.0 * np.sqrt(2.0 / len(cells))
     assert np.mean((off_um / sigma_um) ** 2) == pytest.approx(1.0, abs=five_sd)

@@ -53,8 +53,8 @@ def scaled(part: Experiment, factor: float) -> Experiment:
 def swapped(part: Experiment) -> tuple[Experiment, set[str]]:
     """The thinnest and the thickest point in each other's place, and their labels."""
     film = part.readings.thickness_um.copy()
-    ends = int(np.argmin(part.means.mean_um)), int(np.argmax(part.means.mean_um))
-    low, high = (part.means.owner == k for k in ends)
+    ends = int(np.argmin(part.readings.mean_um)), int(np.argmax(part.readings.mean_um))
+    low, high = (part.readings.owner == k for k in ends)
     film[low], film[high] = film[high], film[low]
     return reading(part, film), {f'{part.name}: P{k}' for k in ends}
 
@@ -131,7 +131,7 @@ def test_readings_in_another_unit(panels, factor, words):
 def test_a_target_tells_the_unit_where_the_film_alone_does_not(panels):
     """100 µm of film may be meant; where 30 are wanted, they are not."""
     tenfold = of(*(scaled(part, 10.0) for part in panels.experiments))
-    mean_um = tenfold.means.mean_um.mean()
+    mean_um = tenfold.readings.mean_um.mean()
     assert said(replace(tenfold, target_um=mean_um / 10.0, tolerance_um=3.0))
     assert said(replace(tenfold, target_um=mean_um, tolerance_um=30.0)) == ()
     # A model of another gun is named, too, and does not stop.

@@ -11,7 +11,7 @@ from paint_deposition.inference.readings import places as on_part
 from paint_deposition.inference.readings import readings as taken
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.gauge_noise import gauge_noise, gross_outliers
-from paint_deposition.inference.readings.readings import PointMeans, Residuals
+from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.motion.path import SprayPath
 from surfaces import refined
 
@@ -100,11 +100,11 @@ def test_without_repeats_only_what_no_gauge_reads_is_gross_and_usual_noise_is_as
 
 
 def test_repeats_are_averaged_in_order_and_one_label_at_two_places_is_refused():
-    means = PointMeans.of(at_points('bacabb', [10.0, 20.0, 30.0, 22.0, 13.0, 16.0]))
-    assert means.first.tolist() == [0, 1, 2]
-    assert means.repeats.tolist() == [3, 2, 1]
-    assert means.mean_um.tolist() == [13.0, 21.0, 30.0]
-    assert means.owner.tolist() == [0, 1, 2, 1, 0, 0]
+    read = at_points('bacabb', [10.0, 20.0, 30.0, 22.0, 13.0, 16.0])
+    assert read.first.tolist() == [0, 1, 2]
+    assert read.repeats.tolist() == [3, 2, 1]
+    assert read.mean_um.tolist() == [13.0, 21.0, 30.0]
+    assert read.owner.tolist() == [0, 1, 2, 1, 0, 0]
     places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.02], [0.0, 0.0, 0.05]])
     labels = np.array(['A', 'A', 'A'])
     taken.require_repeats_close(pd.Readings.of(places[:2], [1.0, 2.0], point=labels[:2]))

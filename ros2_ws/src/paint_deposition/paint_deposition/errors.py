@@ -27,10 +27,6 @@ class ReadingsError(PaintError):
     """Gauge readings or a campaign cannot be used."""
 
 
-class PlanError(PaintError):
-    """A request for passes or an index has no answer."""
-
-
 class BatchError(PaintError):
     """A sweep over cases cannot be run."""
 

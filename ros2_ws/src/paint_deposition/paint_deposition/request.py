@@ -20,11 +20,10 @@ from pydantic import (
     Field,
     ValidationError,
     field_validator,
-    model_validator,
 )
 from pydantic.fields import FieldInfo
 
-from paint_deposition.errors import PaintError, PlanError, did_you_mean, quoted
+from paint_deposition.errors import PaintError, did_you_mean, quoted
 
 Verb = TypeVar('Verb', bound=Callable)
 Made = TypeVar('Made', bound=BaseModel)
@@ -50,7 +49,7 @@ class Request(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
-    error_class: ClassVar[type[PaintError]] = PlanError
+    error_class: ClassVar[type[PaintError]] = PaintError
 
     def __init__(self, **values: Any) -> None:
         try:
@@ -127,21 +126,6 @@ class OnePart(BaseModel):
     max_pose_gap_s: Number = given(
         0.25, 'A longer interval between poses is a gap, in which the gun is off [s].', above=0.0
     )
-
-
-class FilmBand(Request):
-    """The film that is wanted on a part."""
-
-    target_um: float = given(0.0, 'Target film [µm].', least=0.0)
-    tolerance_um: float = given(
-        0.0, 'Accepted difference from the target, either way [µm].', least=0.0
-    )
-
-    @model_validator(mode='after')
-    def _has_target(self) -> 'FilmBand':
-        if self.tolerance_um and not self.target_um:
-            raise PlanError('tolerance_um has no target_um; give both')
-        return self
 
 
 class MotionOptions(BaseModel, extra='forbid'):

@@ -78,8 +78,8 @@ def compare(
     progress('fitting the pattern')
     study, fit = clean_and_fit(campaign, start, start.effects, STARTS if model else 10)
     progress('comparing')
-    reaches = short_reaches(study.campaign, fit.model) if model is None else ()
-    warnings = (*study.warnings, *doubts, *map(str, reaches))
+    short = short_reaches(study.campaign, fit.model) if model is None else {}
+    warnings = (*study.warnings, *doubts, *short.values())
     return replace(compared(study, model or fit.model), warnings=warnings)
 
 
@@ -138,8 +138,8 @@ def diagnose(
     library = dict(EFFECTS) | own
     start, known, doubts = _start(campaign, model, posterior)
     found = diagnosed(campaign, start, library, seed, progress, known)
-    reaches = () if known else short_reaches(found.study.campaign, found.model)
-    found = replace(found, remarks=(*_about(found), *doubts, *found.remarks, *map(str, reaches)))
+    short = {} if known else short_reaches(found.study.campaign, found.model)
+    found = replace(found, remarks=(*_about(found), *doubts, *found.remarks, *short.values()))
     progress('looking for what to measure and spray next')
     return with_proposals(found, library)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.inference.fitting.parameters import Posterior
@@ -59,7 +59,7 @@ def recommend(model: DepositionModel | None = None, **wanted: Any) -> Recommenda
             ``target_um`` at least.
 
     Raises:
-        PlanError: the request has no answer; says why and what comes closest.
+        PaintError: the request has no answer; says why and what comes closest.
     """
     return recommended(model or DepositionModel(), IndexRequest(**wanted))
 
@@ -92,8 +92,8 @@ def plan(
             ``target_um`` at least, or zones.
 
     Raises:
-        PlanError: the request has no answer, or the gun touches the part; says why and what comes
-            closest. PaintError: a zone has no vertex of the part.
+        PaintError: the request has no answer, the gun touches the part, or a zone has no vertex of
+            it; says why and what comes closest.
     """
     request, on_part = _with_zones(surface, zones, wanted)
     unoptimised = planned(
@@ -125,7 +125,7 @@ def plan_faces(
         face_angle_deg: greatest angle between a normal of a face and its mean [deg].
 
     Raises:
-        PlanError: the request has no answer; says why and what comes closest.
+        PaintError: the request has no answer; says why and what comes closest.
     """
     request, on_part = _with_zones(surface, zones, wanted)
     envelope = envelope or GunEnvelope()
@@ -176,8 +176,8 @@ def improve(
         wanted: the fields of ``planning.requests.ImproveRequest``.
 
     Raises:
-        RecordingError: the motion cannot be used. PlanError: the limits leave no motion.
-        PaintError: a zone has no vertex of the part.
+        RecordingError: the motion cannot be used.
+        PaintError: the limits leave no motion, or a zone has no vertex of the part.
     """
     model = model or DepositionModel()
     request = ImproveRequest(**wanted)
@@ -201,34 +201,39 @@ def improve(
         if (length := np.linalg.norm(towards)) >= 0.9:
             target_region &= painted_side(surface, towards / length)
     if not target_region.any():
-        raise PlanError(
+        raise PaintError(
             f'{trajectory.source}: nowhere does the gun face what it paints; check its axis '
             '(--tool-axis) and where the part stands (--part-pose), paint inspect draws both'
         )
     sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
-    if sought.target_um is None:
-        mean_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])
-        sought = replace(sought, target_um=mean_um, elsewhere_um=mean_um)
+    target_um = sought.target_um
+    if target_um is None:
+        target_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])
+        sought = replace(sought, target_um=target_um, elsewhere_um=target_um)
     models = [model]
     if posterior is not None:
         models += draw_models(model, posterior, 8, seed)
-    retiming = retime_for_evenness(surface, sought, original, models, request, progress)
+    programme, binding, limits, of_path = retime_for_evenness(
+        surface, sought, original, models, request, progress
+    )
     drive = None
     if robot:
-        drive = robot.drive(retiming.programme.trajectory(), free_roll=False, begin=begin)
-        retiming = replace(retiming, programme=Programme.of(drive.trajectory))
-    moves = moves_of(retiming.programme, request)
+        drive = robot.drive(programme.trajectory(), free_roll=False, begin=begin)
+        programme = Programme.of(drive.trajectory)
+    moves = moves_of(programme, request)
     progress('the film as it will be', 0.0)
-    improved = retiming.programme.trajectory()
+    improved = programme.trajectory()
     new_um, new_paint = simulated(surface, model, improved)
     program_um, _ = simulated(surface, model, timed(moves, gun_known=True))
     tolerance = request.tolerance or DEFAULT_TOLERANCE
     before = LaidFilm.of(surface, sought, trajectory, film_um, paint, tolerance)
     after = LaidFilm.of(surface, sought, improved, new_um, new_paint, tolerance)
     return Improvement(
-        surface, sought, model, request, improved, moves, retiming, before,
-        after, float(np.abs(program_um - new_um).max() / new_um.max()),
-        (*seen.trajectory.warnings, *seen.geometry.warnings), drive,
+        surface, sought, model, request, improved, moves, original, programme, target_um,
+        binding=binding, binding_limits=limits, sigma_n_of_path=min(of_path, after.sigma_n),
+        before=before, after=after,
+        program_difference=float(np.abs(program_um - new_um).max() / new_um.max()),
+        geometry_warnings=(*seen.trajectory.warnings, *seen.geometry.warnings), drive=drive,
     )  # fmt: skip
 
 
@@ -253,11 +258,11 @@ def read_robot(
         PaintError: the file cannot be read, or a joint has no greatest speed.
     """
     if not is_pose(part_pose):
-        raise PlanError(f'part_pose is {list(part_pose)}; give {POSE_FORMAT}')
+        raise PaintError(f'part_pose is {list(part_pose)}; give {POSE_FORMAT}')
     arm = Robot.read(Path(urdf), tip_link, base_link).arm
     unknown = np.array(arm.joints)[np.isinf(arm.fastest)]
     if len(unknown):
-        raise PlanError(
+        raise PaintError(
             f'the URDF has no greatest speed of {" ".join(unknown)}; give each a limit, as '
             '<limit lower="-3" upper="3" effort="0" velocity="2"/>'
         )

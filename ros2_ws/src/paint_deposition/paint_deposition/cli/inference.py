@@ -155,17 +155,18 @@ def _side_by_side_lines(beside: pd.SideBySide) -> Iterator[str]:
     parts = [e.name for e in next(iter(beside.by_name.values())).study.campaign.experiments]
     yield f'{"RMSE [µm]":{width}}  {"all":>10}' + ''.join(f'  {part:>10}' for part in parts)
     for name, comparison in beside.by_name.items():
-        errors = [m.residuals.rmse_um for m in comparison.misfits if m.kind == 'experiment']
+        misfits = comparison.misfits.items()
+        errors = [found.rmse_um for (_, kind, _), found in misfits if kind == 'experiment']
         errors.insert(0, comparison.points.rmse_um)
         yield f'{name:{width}}' + ''.join(f'  {value:10.2f}' for value in errors)
     yield f'smallest error: {beside.best}'
 
 
 def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
-    for misfit in comparison.misfits:
-        found, indent = misfit.residuals, '' if misfit.kind == 'experiment' else '  '
+    for (_, kind, label), found in comparison.misfits.items():
+        indent = '' if kind == 'experiment' else '  '
         yield (
-            f'{indent}{misfit.label}: {len(found)} readings, bias {found.bias_um:+.2f} µm, '
+            f'{indent}{label}: {len(found)} readings, bias {found.bias_um:+.2f} µm, '
             f'RMSE {found.rmse_um:.2f} µm, chi2 per reading {found.chi_square_per_reading:.2f}'
         )
     yield from (zone.sentence for zone in comparison.zones)

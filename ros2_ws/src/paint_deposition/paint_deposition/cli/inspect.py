@@ -177,17 +177,16 @@ def _readings_contents(path: Path, points_file: Path | None) -> Contents:
     import numpy as np
 
     from paint_deposition.inference.readings.gauge_noise import gauge_noise
-    from paint_deposition.inference.readings.readings import PointMeans
 
     readings = pd.read_readings(path, points_file)
     # A point that is read in two layers is two points.
     named = zip(readings.point, readings.layer, strict=True)
     places = [f'{point}, {layer}' if layer else point for point, layer in named]
     readings = replace(readings, point=np.array(places))
-    film, means, noise = readings.thickness_um, PointMeans.of(readings), gauge_noise(readings)
+    film, noise = readings.thickness_um, gauge_noise(readings)
     zeros, repeated = (
         list(dict.fromkeys(readings.point[rows].tolist()))
-        for rows in (film == 0.0, (means.repeats > 1)[means.owner])
+        for rows in (film == 0.0, (readings.repeats > 1)[readings.owner])
     )
     warnings = [*readings.doubts]
     if zeros:
@@ -198,7 +197,7 @@ def _readings_contents(path: Path, points_file: Path | None) -> Contents:
     print_all('warning', warnings)
     box, where = _box(readings.positions_m)
     figures = {
-        'readings': len(readings), 'points': len(means.first), 'zeros': zeros,
+        'readings': len(readings), 'points': len(readings.first), 'zeros': zeros,
         'repeated': repeated, 'noise_um': noise.typical_um, 'noise_source': noise.source,
         'mean_um': film.mean(), 'min_um': film.min(), 'max_um': film.max(), **box,
         'notes': [readings.understood], 'warnings': warnings,
@@ -206,7 +205,7 @@ def _readings_contents(path: Path, points_file: Path | None) -> Contents:
     repeats = f'{len(repeated)} of them measured again' if repeated else 'none measured again'
     return figures, [
         readings.understood,
-        f'{len(readings)} readings at {len(means.first)} points, {repeats}: noise of the gauge '
+        f'{len(readings)} readings at {len(readings.first)} points, {repeats}: noise of the gauge '
         f'{noise.typical_um:.2f} µm, {noise.source}',
         f'film {film.min():.1f} to {film.max():.1f} µm, mean {film.mean():.1f} µm',
         where,

@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 
 import paint_deposition as pd
 from paint_deposition.errors import PaintError
-from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request, is_pose
+from paint_deposition.request import MotionOptions, OnePart, Request, is_pose
 
 Decorator = Callable[[Callable], Callable]
 
@@ -196,6 +196,12 @@ def _allow_effects(ctx: click.Context, param: click.Parameter, given: bool) -> N
         ctx.call_on_close(lambda: effects_allowed.reset(token))
 
 
+def _band(target_um: float, tolerance_um: float) -> dict[str, float]:
+    if tolerance_um and not target_um:
+        raise PaintError('tolerance_um has no target_um; give both')
+    return {'target_um': target_um, 'tolerance_um': tolerance_um}
+
+
 JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
 CAMPAIGN = click.argument('campaign', type=FILE)
 POINTS = click.option(
@@ -213,8 +219,19 @@ ALLOW_EFFECTS = click.option(
 PART_POSE = option_of(MotionOptions, 'part_pose', callback=_pose)
 MAX_POSE_GAP = option_of(OnePart, 'max_pose_gap_s')
 motion_options = options_of(MotionOptions, 'motion', part_pose={'callback': _pose})
-none = {'show_default': 'none'}
-band_options = options_of(FilmBand, 'band', target_um=none, tolerance_um=none)
+band_options = option_group(
+    {
+        'target_um': click.option(
+            '--target-um', default=0.0, type=NOT_NEGATIVE, show_default='none',
+            help='Target film [µm].',
+        ),
+        'tolerance_um': click.option(
+            '--tolerance-um', default=0.0, type=NOT_NEGATIVE, show_default='none',
+            help='Accepted difference from the target, either way [µm].',
+        ),
+    },
+    'band', _band, {'target_um': '--target-um', 'tolerance_um': '--tolerance-um'},
+)  # fmt: skip
 JOINT_ACCELERATION = click.option(
     '--joint-acceleration', type=POSITIVE,
     help='Greatest acceleration of every joint of a robot that is to drive the motion [rad/s2 or '

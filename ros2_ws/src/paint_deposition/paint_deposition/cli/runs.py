@@ -18,7 +18,7 @@ from paint_deposition.cli.models import models_for
 from paint_deposition.cli.results import SHOW_PROGRESS_AFTER_S, Show, print_all, progress, python
 from paint_deposition.errors import PaintError
 from paint_deposition.report.live_page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
-from paint_deposition.request import FilmBand, MotionOptions, validate
+from paint_deposition.request import MotionOptions, validate
 
 if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
@@ -59,7 +59,7 @@ def watch_command(
     part: options.Part,
     model_file: Path | None,
     motion: dict[str, Any],
-    band: FilmBand,
+    band: dict[str, float],
     host: str,
     port: int,
     token: str,
@@ -79,8 +79,8 @@ def watch_command(
             raise click.UsageError(f'{others[0]} is for a recorded RUN, not for --live')
         values = {
             'mesh_file': part.mesh, 'mesh_scale': part.mesh_scale,
-            'max_edge_length_m': part.max_edge_length_m, 'target_um': band.target_um,
-            'target_tolerance_um': band.tolerance_um, 'host': host, 'port': port,
+            'max_edge_length_m': part.max_edge_length_m, 'target_um': band['target_um'],
+            'target_tolerance_um': band['tolerance_um'], 'host': host, 'port': port,
             'down': None if part.down is None else list(part.down),
         }  # fmt: skip
         # This process becomes the node, which says what it needs; others can read its words.
@@ -90,7 +90,7 @@ def watch_command(
         command = python(node, '--ros-args', *(word for value in given for word in ('-p', value)))
         os.execv(command[0], command)
     with progress('watch') as show:
-        replay = _replay(show, run, part, model_file, motion, {**dict(band), **pace})
+        replay = _replay(show, run, part, model_file, motion, {**band, **pace})
         page = Page(replay.scene, host, port, token, replay.command)
     print_all('warning', replay.warnings)
     click.echo(f'{page.url}  (Ctrl-C ends it)')

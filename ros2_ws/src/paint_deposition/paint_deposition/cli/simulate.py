@@ -22,7 +22,7 @@ from paint_deposition.cli.results import (
 )
 from paint_deposition.errors import RecordingError
 from paint_deposition.planning.requests import MeasureRequest, PlanRequest
-from paint_deposition.request import FilmBand, MotionOptions, validate
+from paint_deposition.request import MotionOptions, validate
 
 if TYPE_CHECKING:
     from paint_deposition.film.statistics import FilmStatistics
@@ -78,7 +78,7 @@ def simulate_command(
     points_file: Path | None,
     motion: dict[str, Any],
     max_pose_gap_s: float,
-    band: FilmBand,
+    band: dict[str, float],
     results: Results,
 ) -> pd.Film:
     """Compute the film on a part from a recorded trajectory.
@@ -103,7 +103,7 @@ def simulate_command(
         film = pd.simulate(
             surface, motions, [file.model for file, _ in chosen], names=names, coats=coats,
             wet_on_wet=wet_on_wet, readings=readings, max_pose_gap_s=max_pose_gap_s, zones=zones,
-            strict=source.strict, progress=show, **dict(band),
+            strict=source.strict, progress=show, **band,
         )  # fmt: skip
         made_from = {
             **inputs(mesh_file=part.mesh, zones_file=part.zones_file),

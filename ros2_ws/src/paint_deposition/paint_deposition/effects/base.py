@@ -183,6 +183,25 @@ class Effect(BaseModel):
         return {name: described[name]['neutral'] for name in cls.amplitudes()}
 
     @classmethod
+    def amplitude_bounds(cls) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) bounds of the amplitudes, from neutral, in their typical sizes."""
+        described = [cls.parameters()[name] for name in cls.amplitudes()]
+        low, high = (
+            np.array([(info[end] - info['neutral']) / info['typical'] for info in described])
+            for end in ('low', 'high')
+        )
+        return low, high
+
+    def with_amplitudes(self, amounts: np.ndarray) -> 'Effect':
+        """The effect with amplitudes (n,) from neutral in their typical sizes, within bounds."""
+        values = {}
+        for name, amount in zip(self.amplitudes(), amounts, strict=True):
+            info = self.parameters()[name]
+            value = info['neutral'] + info['typical'] * amount
+            values[name] = float(np.clip(value, info['low'], info['high']))
+        return self.model_copy(update=values)
+
+    @classmethod
     def coordinates(cls) -> dict[str, str]:
         """Each parameter's name where its uncertainty is about normal: shapes as logarithms."""
         return {

@@ -27,7 +27,10 @@ class _Gun(MotionOptions):
 
 
 class PaintJob(_Gun):
-    """What is painted in one go: an experiment, or one of its coats."""
+    """What is painted in one go: an experiment, or one of its coats.
+
+    What a coat does not say holds for it as for the experiment.
+    """
 
     name: Name = ''
     guns: list[Any] = Field(
@@ -36,11 +39,6 @@ class PaintJob(_Gun):
     solids: Number | None = Field(
         None, gt=0.0, le=1.0, description='share of solids in the volume of the wet paint [1]'
     )
-
-
-class CoatEntry(PaintJob):
-    """A coat as it is written; what it does not say holds for it as for the experiment."""
-
     wet_on_wet: bool = Field(
         False, description='true or false, whether the coat before it was still wet'
     )
@@ -74,7 +72,7 @@ def laid_coats(
         ReadingsError: naming the coat or the gun and the key at fault.
     """
     coats = [
-        validate(CoatEntry, f'coat {number}', one, ReadingsError)
+        validate(PaintJob, f'coat {number}', one, ReadingsError)
         for number, one in enumerate(written, start=1)
     ]
     called = [coat.name for coat in coats]
@@ -91,7 +89,8 @@ def laid_coats(
             whose = whose if given == [{}] else f'gun {number}'
             guns.append(_motion(folder, (gun, coat, entry), whose))
         names += [coat.name] * len(given) * bool(coats)
-    on_wet = {coat.name for coat in coats if coat.wet_on_wet}
+    says = {coat.name: coat if 'wet_on_wet' in coat.model_fields_set else entry for coat in coats}
+    on_wet = {name for name, job in says.items() if job.wet_on_wet}
     solids = [entry.solids if coat.solids is None else coat.solids for coat in jobs]
     return Coats.of_guns(names, len(guns), on_wet), guns, solids
 

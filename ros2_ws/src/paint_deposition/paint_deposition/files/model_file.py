@@ -21,7 +21,7 @@ from paint_deposition.errors import ModelError, quoted
 from paint_deposition.files.atomic import plain, read_yaml, write_text
 from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.inference.fitting.parameters import Posterior
-from paint_deposition.model.eq1_pattern import MOST, Brush, PlanarPattern, SetPoints
+from paint_deposition.model.eq1_pattern import MOST, Brush, BrushEntry, PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.request import validate
 
@@ -38,10 +38,6 @@ class ProjectionSection(Projection):
     occlusion: bool = Field(
         False, description='whether the effect occlusion is added, at full strength'
     )
-
-
-class _BrushEntry(SetPoints):
-    planar: Any = Field(None, description='a mapping: eq. (1) as measured at the set-points')
 
 
 class _Sections(BaseModel, extra='forbid'):
@@ -166,7 +162,7 @@ def _brushes(section: Mapping[Any, Any]) -> list[Brush]:
             raise ModelError(
                 f'brushes: {quoted(number)} is not a brush number; give 1, 2 and so on'
             )
-        given = validate(_BrushEntry, f'brushes, {number}', entry, ModelError)
+        given = validate(BrushEntry, f'brushes, {number}', entry, ModelError)
         if given.planar is None:
             raise ModelError(
                 f'brushes, {number}: planar is missing; calibrate the brush, or take it out'
@@ -220,7 +216,7 @@ def model_text(
             entry = CommentedMap({'planar': _fields(brush.planar)})
             entry |= plain(brush.model_dump(exclude={'number', 'planar'}, exclude_none=True))
             for key in [*entry][1:]:
-                description = SetPoints.model_fields[key].description
+                description = BrushEntry.model_fields[key].description
                 entry.yaml_add_eol_comment(description, key, COMMENT_COLUMN)
             text['brushes'][brush.number] = entry
     else:

@@ -67,7 +67,13 @@ def model_digest(model: DepositionModel) -> str:
 
 
 def _values(model: DepositionModel) -> dict[str, Any]:
-    brushes = {'brushes': [plain(brush.model_dump()) for brush in model.brushes]}
+    # The patterns come last, as digests have always had them.
+    brushes = {
+        'brushes': [
+            plain(brush.model_dump(exclude={'planar'}) | {'planar': brush.planar.model_dump()})
+            for brush in model.brushes
+        ]
+    }
     return {
         **(brushes if model.brushes else {'planar': plain(model.planar.model_dump())}),
         'projection': plain(model.projection.model_dump()),

@@ -43,10 +43,9 @@ class GunView:
         paint = np.cumsum(path.flow * path.dwell_s)
         shares = (np.arange(POSES) + 0.5) / POSES
         self.path = path.select(np.searchsorted(paint, shares * paint[-1]))
-        place = surface.locate(self.path.position_m)
-        self.distance_m, self.normals = place.distance_m, place.normals
-        way = place.positions_m - self.path.position_m
-        self.way = way / np.maximum(place.distance_m, 1e-9)[:, None]
+        nearest_m, self.normals, self.distance_m = surface.locate(self.path.position_m)
+        way = nearest_m - self.path.position_m
+        self.way = way / np.maximum(self.distance_m, 1e-9)[:, None]
 
     @cached_property
     def over(self) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq3_collapse import (
     NEGLIGIBLE,
@@ -55,15 +55,15 @@ def collapse_um(
         (N,) film [um].
 
     Raises:
-        PlanError: speed or standoff is not above zero, or the plane is behind the emission point.
+        PaintError: speed or standoff is not above zero, or the plane is behind the emission point.
     """
     standoff = model.projection.nominal_standoff_m if standoff_m is None else standoff_m
     for name, value in (('speed_m_per_s', speed_m_per_s), ('standoff_m', standoff)):
         if not (math.isfinite(value) and value > 0.0):
-            raise PlanError(f'{name} is {value:g}; give a number above 0')
+            raise PaintError(f'{name} is {value:g}; give a number above 0')
     offset_m, nearest_m = model.projection.emission_offset_m, model.projection.nearest_m
     if standoff + offset_m <= nearest_m:
-        raise PlanError(
+        raise PaintError(
             f'standoff_m is {standoff:g} and the emission point of the model lies {-offset_m:g} m '
             f'in front of the TCP: give a standoff above {nearest_m - offset_m:g}'
         )

@@ -8,6 +8,7 @@ phi is well-behaved when K3 vanishes.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
@@ -154,8 +155,8 @@ class PlanarPattern(BaseModel):
 MOST = 2**31 - 1
 
 
-class SetPoints(BaseModel):
-    """What the cell sets for a brush; None is not known."""
+class BrushEntry(BaseModel):
+    """A brush as a file gives it by its number: what the cell sets, None where not known."""
 
     model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
 
@@ -177,9 +178,10 @@ class SetPoints(BaseModel):
     density_g_per_cm3: float | None = Field(
         None, gt=0.0, le=20.0, description='of the wet paint [g/cm3]'
     )
+    planar: Any = Field(None, description='a mapping: eq. (1) as measured at the set-points')
 
 
-class Brush(SetPoints):
+class Brush(BrushEntry):
     """The pattern of eq. (1) at one setting of the atomizer."""
 
     number: int = Field(ge=1, le=MOST)  # by which programmes choose it

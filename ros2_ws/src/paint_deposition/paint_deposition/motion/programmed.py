@@ -32,9 +32,9 @@ class GunSwitch:
 
 @dataclass(frozen=True)
 class Move:
-    """A move to a pose of the TCP."""
+    """A move to a pose of the TCP as programmed; on the robot, zones cut its corners."""
 
-    position_m: np.ndarray  # (3,) TCP at the end of the move [m]
+    position_m: np.ndarray  # (3,) TCP at the end of the move, in its frame [m]
     quaternion_xyzw: np.ndarray  # (4,) orientation of the tool there, scalar last
     speed_m_per_s: float
     spraying: bool  # whether the gun is on as the move begins
@@ -45,6 +45,15 @@ class Move:
     flow: float = 1.0  # of the gun while it is on, relative to the calibrated one
     brush: int = ONLY_BRUSH  # its number while it is on; 0 is the only one
     wait_s: float = 0.0  # how long it takes at least
+    # Of a RAPID program: the instruction in lower case, the radius in which the corner is cut, 0:
+    # stop, and the names of tool and work object.
+    instruction: str = ''
+    zone_m: float = 0.0
+    tool: str = ''
+    work_object: str = ''
+    # That of the work object if the modules do not define it, or of the mechanical unit that
+    # moves it; '' for the world.
+    frame: str = ''
 
 
 def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:

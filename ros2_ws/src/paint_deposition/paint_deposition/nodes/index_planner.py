@@ -16,7 +16,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PaintError, PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.nodes import topics
@@ -156,7 +156,7 @@ class IndexPlanner(PaintNode):
         """Plan passes, with some parameters replaced, and publish them."""
         values = self.values | dict(changed)
         if not values['mesh_file']:
-            raise PlanError('mesh_file is empty: name the mesh of the part')
+            raise PaintError('mesh_file is empty: name the mesh of the part')
         progress('reading the mesh', 0.0)
         mesh_file = os.path.expanduser(values['mesh_file'])
         self.require_named_folder(mesh_file)

@@ -103,7 +103,7 @@ class ModelComparison(PaintingNode):
     def residuals(self) -> Residuals:
         """The residuals of all readings, with the film of all poses received."""
         predicted = self.film.snapshot().gauge_um[: len(self._experiment)]
-        at_readings = predicted[self._experiment.means.owner]
+        at_readings = predicted[self._experiment.readings.owner]
         return Residuals(self.readings.thickness_um, at_readings, self._noise.sigma_um)
 
     # --- parameters
@@ -150,8 +150,7 @@ class ModelComparison(PaintingNode):
             worst_residual_um=float(residuals.residual_um[residuals.worst]),
         )
         self._stats_publisher.publish(stats)
-        means = self._experiment.means
-        at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
+        at_points = self._experiment.readings.mean_um - film.gauge_um[: len(self._experiment)]
         scale = self._scale
         rows = scale.rows(self._spreading @ at_points, self._coloured)
         self._mesh_publisher.publish(self._mesh(stamp_ns, scale.palette, rows))

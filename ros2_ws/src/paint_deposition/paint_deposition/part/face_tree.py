@@ -212,17 +212,6 @@ def first_hits(starts, ways, vertices, faces, nodes, met, start, stop):
 THICKNESS_M = 0.06
 
 
-@dataclass(frozen=True)
-class Location:
-    """Places on the surface closest to N points."""
-
-    positions_m: np.ndarray  # (N, 3) the places [m]
-    normals: np.ndarray  # (N, 3) outward unit normals of the surface there
-    distance_m: np.ndarray  # (N,) from the point to the place [m]
-    # (N,) between the point's own normal and the surface's, NaN where none was given.
-    angle_rad: np.ndarray
-
-
 def locate(
     tree: FaceTree,
     vertex_normals: np.ndarray,
@@ -230,7 +219,7 @@ def locate(
     normals: np.ndarray | None = None,
     side: np.ndarray | None = None,
     least_cosine: float = 0.0,
-) -> Location:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """See ``Surface.locate``; without ``normals`` the back of the only ``side`` is not taken.
 
     Surface agrees with ``normals`` if the cosine between them is no less than ``least_cosine``.
@@ -262,11 +251,7 @@ def locate(
     weights /= weights.sum(axis=1, keepdims=True)
     outward = np.einsum('nk,nki->ni', weights, vertex_normals[corners])
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    angle = np.full(len(points), np.nan)
-    if normals is not None:
-        across = np.linalg.norm(np.cross(outward, wanted), axis=1)
-        angle = np.arctan2(across, np.einsum('ij,ij->i', outward, wanted))
-    return Location(place, outward, np.linalg.norm(points - place, axis=1), angle)
+    return place, outward, np.linalg.norm(points - place, axis=1)
 
 
 @njit(cache=True, nogil=True)

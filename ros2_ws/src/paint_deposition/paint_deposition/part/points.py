@@ -231,6 +231,12 @@ class SurfacePoints:
         )  # fmt: skip
 
 
+def angles_rad(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(N,) angles between vectors (N, 3), of any lengths."""
+    across = np.linalg.norm(np.cross(one, other), axis=1)
+    return np.arctan2(across, np.einsum('ij,ij->i', one, other))
+
+
 def box_words(positions_m: np.ndarray) -> str:
     """'x 0.000 to 1.200, y 0.000 to 0.700, z ... m', the box around points (N, 3) [m]."""
     low, high = positions_m.min(axis=0).round(3) + 0.0, positions_m.max(axis=0).round(3) + 0.0

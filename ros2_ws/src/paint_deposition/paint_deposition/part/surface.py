@@ -23,7 +23,7 @@ from paint_deposition.part.edges import (
     matched_half_edges,
     without_seams,
 )
-from paint_deposition.part.face_tree import FaceTree, Location, first_hits, locate
+from paint_deposition.part.face_tree import FaceTree, first_hits, locate
 from paint_deposition.part.points import (
     CANCELLED,
     ONE_SIDED,
@@ -184,13 +184,19 @@ class Surface:
             **self._covariates(self.vertices_m, self.normals),
         )
 
-    def locate(self, points_m: np.ndarray, normals: np.ndarray | None = None) -> Location:
-        """The closest places on the surface; see ``Location``.
+    def locate(
+        self, points_m: np.ndarray, normals: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The closest places on the surface.
 
         Args:
             points_m: (N, 3) [m].
             normals: (N, 3) outward, any length; between two sides of a thin part the one that
                 agrees is taken. Without them it is the one that the gun paints, if only one is.
+
+        Returns:
+            (N, 3) the places [m], (N, 3) outward unit normals of the surface there, and (N,) the
+            distance of each point from its place [m].
         """
         # A gun whose mean direction is shorter has turned to more sides of the part than one.
         one_side = self.gun_side is not None and np.linalg.norm(self.gun_side) >= 0.9
@@ -210,19 +216,16 @@ class Surface:
             stencil_m: if given, the N points are followed by N neighbours this far up the surface
                 and N this far down, and the slope is defined on the first N.
         """
-        place = self.locate(points_m, normals)
-        positions, outward = place.positions_m, place.normals
+        positions, outward, _ = self.locate(points_m, normals)
         operator = None
         if stencil_m is not None and len(positions):
             way = derivatives.downhill(outward, self.down)
             unit = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
-            above = self.locate(positions - stencil_m * unit, outward)
-            below = self.locate(positions + stencil_m * unit, outward)
-            operator = derivatives.slope_at_stencil(
-                positions, above.positions_m, below.positions_m, way
-            )
-            positions = np.concatenate([positions, above.positions_m, below.positions_m])
-            outward = np.concatenate([outward, above.normals, below.normals])
+            above_m, above_normals, _ = self.locate(positions - stencil_m * unit, outward)
+            below_m, below_normals, _ = self.locate(positions + stencil_m * unit, outward)
+            operator = derivatives.slope_at_stencil(positions, above_m, below_m, way)
+            positions = np.concatenate([positions, above_m, below_m])
+            outward = np.concatenate([outward, above_normals, below_normals])
         return SurfacePoints(
             positions, outward, slope_per_m=operator, **self._covariates(positions, outward)
         )

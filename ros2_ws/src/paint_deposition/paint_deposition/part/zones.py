@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from paint_deposition.errors import PaintError
-from paint_deposition.part.face_tree import FaceTree, Location, locate
-from paint_deposition.part.points import box_words
+from paint_deposition.part.face_tree import FaceTree, locate
+from paint_deposition.part.points import angles_rad, box_words
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 
@@ -36,9 +36,9 @@ class Zone:
             low, high = self.box_m
             held = np.all((positions_m >= low) & (positions_m <= high), axis=1)
         if self.triangles_m is not None:
-            near, over, place = self._over(self.triangles_m, positions_m, normals)
+            near, over, outward = self._over(self.triangles_m, positions_m, normals)
             inside = np.zeros(len(positions_m), dtype=bool)
-            inside[near] = over & (np.cos(place.angle_rad) >= AGREE)
+            inside[near] = over & (np.cos(angles_rad(outward, normals[near])) >= AGREE)
             held &= inside
         return held
 
@@ -46,8 +46,8 @@ class Zone:
         """The zone, its triangles wound outward: most of the surface over them says which way."""
         if self.triangles_m is None:
             return self
-        near, over, place = self._over(self.triangles_m, surface.vertices_m, None)
-        cosine = np.einsum('ij,ij->i', place.normals, surface.normals[near])
+        near, over, outward = self._over(self.triangles_m, surface.vertices_m, None)
+        cosine = np.einsum('ij,ij->i', outward, surface.normals[near])
         area = surface.vertex_areas_m2[near] * (over & (np.abs(cosine) >= AGREE))
         if area @ np.sign(cosine) < 0.0:
             return replace(self, triangles_m=self.triangles_m[:, ::-1])
@@ -56,8 +56,8 @@ class Zone:
     @staticmethod
     def _over(
         triangles_m: np.ndarray, positions_m: np.ndarray, normals: np.ndarray | None
-    ) -> tuple[np.ndarray, np.ndarray, Location]:
-        """Rows (n,) of points near the triangles, which of them lie over one (n,), and where."""
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows (n,) of points near the triangles, which of them lie over one (n,), its normals."""
         corners = triangles_m.reshape(-1, 3)
         low, high = corners.min(axis=0), corners.max(axis=0)
         inside = (positions_m >= low - ABOVE_M) & (positions_m <= high + ABOVE_M)
@@ -67,10 +67,12 @@ class Zone:
         faces = np.arange(len(corners)).reshape(-1, 3)
         of_corners = np.repeat(face_normals(corners, faces), 3, axis=0)
         tree = FaceTree.of(corners, faces)
-        place = locate(tree, of_corners, positions_m[near], wanted, least_cosine=AGREE)
-        above = np.einsum('ij,ij->i', positions_m[near] - place.positions_m, place.normals)
-        beside2 = np.maximum(place.distance_m**2 - above**2, 0.0)
-        return near, (np.abs(above) <= ABOVE_M) & (beside2 <= BESIDE_M**2), place
+        place_m, outward, distance_m = locate(
+            tree, of_corners, positions_m[near], wanted, least_cosine=AGREE
+        )
+        above = np.einsum('ij,ij->i', positions_m[near] - place_m, outward)
+        beside2 = np.maximum(distance_m**2 - above**2, 0.0)
+        return near, (np.abs(above) <= ABOVE_M) & (beside2 <= BESIDE_M**2), outward
 
 
 @dataclass(frozen=True)

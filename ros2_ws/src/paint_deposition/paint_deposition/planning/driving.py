@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.motion.arm import Arm
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory, gap_ns
@@ -94,7 +94,7 @@ class RobotCell:
         configuration to begin in, where it is chosen already.
 
         Raises:
-            PlanError: the robot does not reach all poses.
+            PaintError: the robot does not reach all poses.
         """
         arm, first_ns = self.arm, int(trajectory.stamps_ns[0])
         times_s, _, joints, begun = self._joints(trajectory, free_roll, begin)
@@ -160,13 +160,13 @@ class RobotCell:
         some_s, some_m = times_s[rows], positions_m[rows]
         begins, ways, reached = ways_of(self.arm, some_m, turns[rows], free_roll, begin)
         if not begins:
-            raise PlanError(
+            raise PaintError(
                 f'the robot does not reach the first pose, {_words(some_m[0])} m in its base; '
                 'check --part-pose, or let paint place look where the part may stand'
             )
         far = int(reached.max())
         if far < len(rows):
-            raise PlanError(
+            raise PaintError(
                 f'the robot follows the motion to {some_s[far]:.1f} of {some_s[-1]:.1f} s and not '
                 f'beyond {_words(some_m[far])} m in its base, in none of {len(begins)} '
                 'configurations; let paint place look where the part may stand'
@@ -176,7 +176,7 @@ class RobotCell:
         near = PchipInterpolator(some_s, ways[best])(times_s)
         joints, error = towards(self.arm, near, positions_m, axes, ROUNDS)
         if error.max() > REACHED:
-            raise PlanError(
+            raise PaintError(
                 f'the robot stands in a singularity near {_words(positions_m[error.argmax()])} m '
                 'in its base; let the part stand elsewhere, paint place shows where'
             )

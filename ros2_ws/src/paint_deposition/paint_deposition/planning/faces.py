@@ -16,7 +16,7 @@ from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
@@ -95,7 +95,7 @@ def plan_faces(
     most, but for 5 % of the area and small patches that go with a neighbour.
 
     Raises:
-        PlanError: a face has no passes, or the film is less even than the tolerance.
+        PaintError: a face has no passes, or the film is less even than the tolerance.
     """
     envelope = envelope or GunEnvelope()
     faces = sprayable_faces(surface, widest_rad)
@@ -104,7 +104,7 @@ def plan_faces(
         # Faces that turn further from the side of the gun are its back.
         faces = tuple(face for face in faces if face.surface.outward @ side > -0.1)
         if not faces:
-            raise PlanError(
+            raise PaintError(
                 f'no surface faces the gun at {" ".join(f"{one:.2g}" for one in side)} from the '
                 'part; give another direction to it (outward)'
             )
@@ -135,7 +135,7 @@ def plan_faces(
     film = LaidFilm.of(surface, wanted, trajectory, *simulated(surface, model, trajectory))
     sigma_n = film.sigma_n
     if request.tolerance is not None and sigma_n > request.tolerance:
-        raise PlanError(
+        raise PaintError(
             f'no passes on {len(faces)} face(s) keep sigma_n within '
             f'{100 * request.tolerance:g} %; the closest is {100 * sigma_n:.2f} %: '
             'allow that much, or narrower faces (--face-angle-deg)'

@@ -17,7 +17,6 @@ from paint_deposition.planning.planned_film import Contact, LaidFilm, WantedFilm
 from paint_deposition.planning.programme import STANDING_M, Programme, strokes_of
 from paint_deposition.planning.quadratic_program import SLOWEST
 from paint_deposition.planning.requests import ImproveRequest
-from paint_deposition.planning.retiming import Retiming
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,11 @@ class Improvement:
         model: what the gun sprays. request: objective and limits.
         trajectory: the improved motion.
         moves: the improved one as moves of a robot program.
-        retiming: how it was found.
+        original, programme: the motion as it was, its gun closed in turns, and the improved one.
+        target_um: mean film aimed at [um].
+        binding: names of all limits that bind; binding_limits: those of them that cost evenness,
+            the strongest first, with sigma_n without each alone.
+        sigma_n_of_path: of the most even film of any speeds along this path.
         before, after: films of the motion as it was and of the improved one.
         program_difference: largest difference between the films of the robot program and of the
             bag, as a share of the greatest film.
@@ -85,7 +88,12 @@ class Improvement:
     request: ImproveRequest
     trajectory: Trajectory
     moves: Sequence[Move]
-    retiming: Retiming
+    original: Programme
+    programme: Programme
+    target_um: float
+    binding: tuple[str, ...]
+    binding_limits: dict[str, float]
+    sigma_n_of_path: float
     before: LaidFilm
     after: LaidFilm
     program_difference: float
@@ -97,7 +105,7 @@ class Improvement:
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user on what was done unasked."""
         given_m = Programme.of(self.before.trajectory).ends_m
-        if np.array_equal(given_m, self.retiming.original.ends_m):
+        if np.array_equal(given_m, self.original.ends_m):
             return ()
         return (
             'the programme sprays through turns beside the part; the gun is closed there now '
@@ -107,7 +115,7 @@ class Improvement:
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
         """What changes, pass by pass, numbered as a simulation of the improved programme does."""
-        original, improved = self.retiming.original, self.retiming.programme
+        original, improved = self.original, self.programme
         ends_m, numbers, begins_pass = strokes_of(improved)
         opened_m, closed_m = Programme.of(self.before.trajectory).ends_m.T
         on_m, off_m = improved.ends_m.T
@@ -143,13 +151,12 @@ class Improvement:
         """What may be wrong, a line each with its likely cause."""
         found = [*self.geometry_warnings, *(self.drive.limits if self.drive else ())]
         found += self.wanted.doubts(self.after.statistics)
-        target_um = self.retiming.target_um
-        off = self.after.mean_um / target_um - 1.0
+        off = self.after.mean_um / self.target_um - 1.0
         # A mean film further from the target than this share gives a warning.
         if abs(off) > 0.02:
             thick, slowed = off > 0.0, bool(self.drive and self.drive.limits)
             other = (SLOWEST,) if thick else (FASTEST, BEND, LEAD, JOINT)
-            names = [name for name in self.retiming.binding if name not in other]
+            names = [name for name in self.binding if name not in other]
             remedy = 'allow a lower speed (--speed-min) or a greater flow (--flow)'
             if thick and slowed:
                 names = ['the joints that slow its passes down']
@@ -157,7 +164,7 @@ class Improvement:
             elif thick:
                 remedy = 'allow a greater speed (--speed-max) or a lower flow (--flow)'
             found.append(
-                f'the mean film is {self.after.mean_um:.1f} µm instead of {target_um:.1f}, '
+                f'the mean film is {self.after.mean_um:.1f} µm instead of {self.target_um:.1f}, '
                 f'bound by {" and ".join(names) or "the path"}; '
                 f'{100 * self.before.within:.0f} → {100 * self.after.within:.0f} % of the area '
                 f'within the tolerance; {remedy}'
@@ -177,7 +184,7 @@ class Improvement:
         """The film accepted, in words."""
         if self.wanted.zones:
             return 'the band of its zone'
-        return f'±{100 * self.after.tolerance:g} % of {self.retiming.target_um:.1f} µm'
+        return f'±{100 * self.after.tolerance:g} % of {self.target_um:.1f} µm'
 
     @property
     def sentence(self) -> str:
@@ -201,16 +208,11 @@ class Improvement:
         )
 
     @property
-    def sigma_n_of_path(self) -> float:
-        """The most even film of any speeds along this path."""
-        return min(self.retiming.sigma_n_of_path, self.after.sigma_n)
-
-    @property
     def limit_sentences(self) -> tuple[str, ...]:
         """Which limits keep the film from being more even, a line each."""
         found = [
             f'limited by {name}: sigma_n {100 * sigma_n:.1f} % without it'
-            for name, sigma_n in self.retiming.binding_limits.items()
+            for name, sigma_n in self.binding_limits.items()
         ]
         window = -self.request.trigger_cut_m, self.request.trigger_shift_m
         ends = [
@@ -257,7 +259,7 @@ class Improvement:
             'region': self.region,
             **both,
             'whole_part': {when: film.whole_part.to_dict() for when, film in films.items()},
-            'target_um': self.retiming.target_um,
+            'target_um': self.target_um,
             'tolerance': self.after.tolerance,
             'sigma_n_of_path': self.sigma_n_of_path,
             'program_difference': self.program_difference,
@@ -269,8 +271,7 @@ class Improvement:
             'target_region_m2': region,
             'area_m2': self.surface.area_m2,
             'binding_limits': [
-                {'name': name, 'sigma_n': sigma_n}
-                for name, sigma_n in self.retiming.binding_limits.items()
+                {'name': name, 'sigma_n': sigma_n} for name, sigma_n in self.binding_limits.items()
             ],
             'passes': [{**asdict(one), 'sentence': one.sentence} for one in self.changes],
             'request': self.request.model_dump(),

@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 from scipy.sparse import coo_array, vstack
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.motion.arm import Arm
 
 # Steps towards a pose from a pose beside it.
@@ -156,7 +156,7 @@ class JointPace:
         share, or its film would be uneven.
 
         Raises:
-            PlanError: the joints hardly allow any speed.
+            PaintError: the joints hardly allow any speed.
         """
         room = np.ones(len(self.times_s) - 1)
         # Limits that are not kept between the times are tightened there, so often at the most.
@@ -206,7 +206,7 @@ class JointPace:
             bounds=np.stack([np.full_like(bound, slowest**2), bound], axis=1), method='highs',
         )  # fmt: skip
         if solved.x is None:
-            raise PlanError(
+            raise PaintError(
                 f'some joints have less than {100 * slowest:.0f} % of the speed or acceleration '
                 'that the motion needs; let the part stand elsewhere, paint place shows where'
             )

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.transforms import Rigid, at_part, is_frame
 from paint_deposition.planning.driving import RobotCell
@@ -154,12 +154,12 @@ def part_places(
         progress: called with what is being done and the share of it that is done, 0 to 1.
 
     Raises:
-        PlanError: the grid is empty.
+        PaintError: the grid is empty.
     """
     if not is_frame(trajectory.frame_id, 'part'):
         trajectory = at_part(trajectory, cell.part.values, 'part')
     if not len(x_m) or not len(y_m):
-        raise PlanError('the grid of places is empty; give FROM TO with FROM below TO')
+        raise PaintError('the grid of places is empty; give FROM TO with FROM below TO')
     arm, shape = cell.arm, (len(y_m), len(x_m))
     reached, speed, room = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     # So many poses are enough for a motion that is only tried.

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, minimize, minimize_scalar
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
@@ -133,7 +133,7 @@ def choose_index(curve: IndexCurve, tolerance: float | None) -> tuple[float, flo
     """The index to recommend [m], see ``recommend``, and sigma_n there.
 
     Raises:
-        PlanError: nothing in the range keeps to the tolerance; names what comes closest.
+        PaintError: nothing in the range keeps to the tolerance; names what comes closest.
     """
     minima = curve.minima
     if tolerance is None:
@@ -141,7 +141,7 @@ def choose_index(curve: IndexCurve, tolerance: float | None) -> tuple[float, flo
     windows = curve.windows_m(tolerance)
     if not windows:
         index_m, sigma_n = min([*minima, curve.best_end], key=itemgetter(1))
-        raise PlanError(
+        raise PaintError(
             f'no index from {curve.index_m[0]:g} to {curve.index_m[-1]:g} m keeps sigma_n within '
             f'{100 * tolerance:g} %; the closest is {100 * sigma_n:.2f} % at '
             f'{index_m:.3f} m: allow that much (tolerance {1.01 * sigma_n:.2g}), '
@@ -233,7 +233,7 @@ def place_passes(
     Equal ends of the range fix the index.
 
     Raises:
-        PlanError: no placement is within the tolerance; names the closest.
+        PaintError: no placement is within the tolerance; names the closest.
     """
     height = float(np.ptp(films.surface_map.extent_m[1]))
     fewest = max(1, int(height / index_range_m[1]))
@@ -248,7 +248,7 @@ def place_passes(
     limit = tolerance or 1.05 * closest.sigma_n + 0.002
     good = [placement for placement in best if placement.sigma_n <= limit]
     if not good:
-        raise PlanError(
+        raise PaintError(
             f'no passes at an index of {index_range_m[0]:.3f} to {index_range_m[1]:.3f} m keep '
             f'sigma_n on this part within {100 * limit:g} %; the closest is '
             f'{100 * closest.sigma_n:.2f} % with {closest.passes} at {closest.index_m:.3f} m: '

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
@@ -117,7 +117,7 @@ def plan(
     With ``zones`` of the vertices the even film of one speed is of their mean target.
 
     Raises:
-        PlanError: the request has no answer; says why and what comes closest.
+        PaintError: the request has no answer; says why and what comes closest.
     """
     axes = pass_axes(surface, request.direction, request.outward)
     surface_map = SurfaceMap(surface, axes, request.smoothing_radius_m)
@@ -134,7 +134,7 @@ def plan(
     )  # fmt: skip
     try:
         plane = recommend(model, on_plane)
-    except PlanError:  # a part may keep to a tolerance that no plane keeps to
+    except PaintError:  # a part may keep to a tolerance that no plane keeps to
         plane = recommend(model, on_plane.model_copy(update={'tolerance': None}))
     style = _style(model, request, plane)
     films = LineFilms(
@@ -154,7 +154,7 @@ def plan(
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
     if tolerance is not None and laid.sigma_n > tolerance:
-        raise PlanError(
+        raise PaintError(
             f'{len(passes)} passes at {placement.index_m:.3f} m lay a film of sigma_n '
             f'{100 * laid.sigma_n:.2f} %, not within {100 * tolerance:g} %: allow that much, '
             'or a smaller index, or choose speeds along the passes (--optimise)'
@@ -195,7 +195,7 @@ def optimise(
     paint wanted on the part, and the cycle time over that of the unoptimised plan.
 
     Raises:
-        PlanError: the film of no number of passes keeps to the tolerance; names the closest.
+        PaintError: the film of no number of passes keeps to the tolerance; names the closest.
     """
     request, count = unoptimised.request, len(unoptimised.passes)
     target = unoptimised.wanted.target_um or unoptimised.mean_um
@@ -218,7 +218,7 @@ def optimise(
     closest = min(tried, key=lambda one: one.sigma_n)
     most = request.tolerance or closest.sigma_n
     if closest.sigma_n > most:
-        raise PlanError(
+        raise PaintError(
             f'no speeds along {count} passes, or about as many, keep sigma_n within '
             f'{100 * most:g} %; the closest is {100 * closest.sigma_n:.2f} % with '
             f'{len(closest.passes)} at {closest.placement.index_m:.3f} m: allow that much, a '
@@ -276,7 +276,7 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     The tool is turned about its own axis where that helps and the pattern is round.
 
     Raises:
-        PlanError: the robot does not reach all passes, or its film exceeds the tolerance.
+        PaintError: the robot does not reach all passes, or its film exceeds the tolerance.
     """
     request, trajectory = planned.request, planned.trajectory
     quarter = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi])
@@ -290,7 +290,7 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     laid = LaidFilm.of(surface, planned.wanted, drive.trajectory, *film)
     sigma_n, most = laid.sigma_n, request.tolerance
     if most is not None and sigma_n > most:
-        raise PlanError(
+        raise PaintError(
             f'as the robot drives it sigma_n is {100 * sigma_n:.2f} %, where a tolerance of '
             f'{100 * most:g} % is given: allow that much, or let the part stand elsewhere, paint '
             'place shows where'
@@ -306,12 +306,12 @@ def kept_clear(planned: Planned, envelope: GunEnvelope) -> Planned:
     """The plan with the places where gun or spray come too close to the part.
 
     Raises:
-        PlanError: the gun touches the part.
+        PaintError: the gun touches the part.
     """
     found = contacts(planned.surface, planned.trajectory, envelope)
     touched = [contact for contact in found if contact.by_gun]
     if touched:
-        raise PlanError(
+        raise PaintError(
             f'{max(touched, key=lambda contact: contact.depth_m)}; give a greater standoff_m or '
             'smoothing_radius_m, another side (outward), a smaller gun (--gun-radius-m, '
             '--gun-length-m), or plan it face by face with `paint plan --faces auto`'

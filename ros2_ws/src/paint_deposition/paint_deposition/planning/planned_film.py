@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import (
     FilmStatistics,
@@ -57,14 +57,14 @@ class WantedFilm:
         """In zones their targets, and elsewhere ``target_um``, count on a region (V,) bool.
 
         Raises:
-            PlanError: no vertex of the region has a target of its own.
+            PaintError: no vertex of the region has a target of its own.
         """
         if zones is None:
             return WantedFilm(region, target_um, target_um, np.ones(len(region)))
         targets, _ = zones.wanted_um(target_um)
         counted = region & ~np.isnan(targets)
         if not (counted & (zones.number >= 0)).any():
-            raise PlanError(
+            raise PaintError(
                 'no zone lies where paint is to land; give zones on the side that the gun faces'
             )
         # By zones, and not by vertices: of equal targets it is the very same.

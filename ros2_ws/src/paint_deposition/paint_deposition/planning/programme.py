@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation, Slerp
 
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen
 from paint_deposition.motion.programmed import Move
@@ -46,14 +46,14 @@ class Programme:
         mean over time.
 
         Raises:
-            PlanError: the gun never sprays on a move, or its clock goes back in between.
+            PaintError: the gun never sprays on a move, or its clock goes back in between.
         """
         batch = PoseBatch.of(
             trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw
         )
         poses, *restarted = PoseScreen(gap_ns(max_pose_gap_s)).take(batch)
         if restarted:
-            raise PlanError(
+            raise PaintError(
                 f'{trajectory.source}: its clock goes back {len(restarted)} times; give one run'
             )
         steps_m = np.linalg.norm(np.diff(poses.positions_m, axis=0), axis=1)
@@ -76,7 +76,7 @@ class Programme:
                 flow = float(np.average(path.flow[rows], weights=path.dwell_s[rows]))
                 openings.append((on, off, flow, int(path.brush[rows[0]])))
         if not openings:
-            raise PlanError(f'{trajectory.source}: the gun never sprays on a move')
+            raise PaintError(f'{trajectory.source}: the gun never sprays on a move')
         *ends, flows, brushes = map(np.array, zip(*openings, strict=True))
         return Programme(
             poses.positions_m, poses.quaternions_xyzw, travel, np.diff(since_ns * 1e-9),

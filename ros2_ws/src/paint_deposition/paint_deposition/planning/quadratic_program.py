@@ -13,7 +13,7 @@ import clarabel
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, identity, vstack
 
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.planning.nodes import BEND, FASTEST, JOINT, LEAD, Nodes
 from paint_deposition.planning.planned_film import Band
 from paint_deposition.planning.requests import ImproveRequest
@@ -70,7 +70,7 @@ def solve(
     names of the limits that bind come last.
 
     Raises:
-        PlanError: the limits contradict each other; names one of them.
+        PaintError: the limits contradict each other; names one of them.
     """
     count, binding = len(problem.nodes), ()
     least, most = problem.request.flow
@@ -86,7 +86,7 @@ def solve(
                 if name in LIMITS and _minimise(matrix, linear, without) is not None:
                     contradicting = f'{name} with the other limits'
                     break
-            raise PlanError(f'no motion along this path keeps {contradicting}; allow more')
+            raise PaintError(f'no motion along this path keeps {contradicting}; allow more')
         values, multipliers = answer
         # A multiplier times a density is what its limit costs, in the units of the objective. A
         # constraint that costs more than this, in units of sigma_n squared, binds.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.model.eq3_collapse import half_width_m
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.planning.placement import (
@@ -107,13 +107,13 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     limits of the request.
 
     Raises:
-        PlanError: there is no such index or speed; says why and what comes closest.
+        PaintError: there is no such index or speed; says why and what comes closest.
         ModelError: the model has several brushes.
     """
     model = model.single('an index')
     standoff = request.standoff_m or model.projection.nominal_standoff_m
     if not standoff > 0.0:
-        raise PlanError(
+        raise PaintError(
             f'the model plane lies {standoff:g} m before the TCP; give standoff_m above 0'
         )
     request = request.model_copy(update={'standoff_m': standoff})
@@ -130,7 +130,7 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     period = np.linspace(0.0, parallel.period_m(index_m), 65)
     # Film below this share of the mean, between passes, is a bare stripe.
     if parallel.thickness_um(index_m, period).min() < 0.01 * parallel.mean_um(index_m):
-        raise PlanError(
+        raise PaintError(
             f'an index of {index_m:.3f} m leaves bare stripes: one pass is '
             f'{width:.3f} m wide at half its height; search about that index'
         )
@@ -196,7 +196,7 @@ def _within_speeds(
         remedy = 'allow other speeds (speed_min_m_per_s, speed_max_m_per_s), or another index'
         if (least, most) == (SLOWEST_M_PER_S, FASTEST_M_PER_S):  # nothing is slower or faster
             remedy = 'give another target or index'
-        raise PlanError(
+        raise PaintError(
             f'target_um {request.target_um:g} at an index from {low_m:g} to {high_m:g} m needs '
             f'{wanted:.3g} m/s, where {least:g} to {most:g} m/s are allowed; the closest is '
             f'{request.target_um * wanted / nearest:.3g} µm at {nearest:g} m/s: {remedy}'

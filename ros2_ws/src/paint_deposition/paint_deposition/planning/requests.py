@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from paint_deposition.errors import PlanError, ReadingsError
+from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.request import Request, given
 
 SLOWEST_M_PER_S, FASTEST_M_PER_S = 0.005, 3.0
@@ -81,7 +81,7 @@ class SpeedLimits(Request):
     def _require_order(self, low: str, high: str) -> None:
         least, most = getattr(self, low), getattr(self, high)
         if least is not None and most is not None and least > most:
-            raise PlanError(f'{low} is {least:g}, above {high}, {most:g}; swap them')
+            raise PaintError(f'{low} is {least:g}, above {high}, {most:g}; swap them')
 
 
 class IndexRequest(SpeedLimits, PassRequest):
@@ -101,7 +101,7 @@ class IndexRequest(SpeedLimits, PassRequest):
     @model_validator(mode='after')
     def _has_speed_or_target(self) -> 'IndexRequest':
         if self.speed_m_per_s is None and self.target_um is None:
-            raise PlanError('neither speed_m_per_s nor target_um is given; give one of them')
+            raise PaintError('neither speed_m_per_s nor target_um is given; give one of them')
         return self
 
     @property
@@ -114,7 +114,7 @@ class IndexRequest(SpeedLimits, PassRequest):
         return 'passes alternate and the gun keeps its orientation: all lay the same profile'
 
     def index_range_m(self, half_width_m: float) -> tuple[float, float]:
-        """Range to search for a pass of this SB50 [m]. Raises PlanError: it is empty."""
+        """Range to search for a pass of this SB50 [m]. Raises PaintError: it is empty."""
         # A pattern of a usual SB50 is searched over the usual range, another over its own scale.
         usual = 0.2, 0.8
         if not 0.25 <= half_width_m <= 0.75:
@@ -122,7 +122,7 @@ class IndexRequest(SpeedLimits, PassRequest):
         low = usual[0] if self.index_min_m is None else self.index_min_m
         high = usual[1] if self.index_max_m is None else self.index_max_m
         if not low < high:
-            raise PlanError(
+            raise PaintError(
                 f'the index range {low:g} to {high:g} m is empty; give index_min_m < index_max_m'
             )
         return low, high
@@ -167,11 +167,11 @@ class PlanRequest(SpeedLimits, PassRequest):
     @model_validator(mode='after')
     def _side_and_index(self) -> 'PlanRequest':
         if self.outward is not None and not any(self.outward):
-            raise PlanError('outward is 0 0 0; give a direction, 0 -1 0 say')
+            raise PaintError('outward is 0 0 0; give a direction, 0 -1 0 say')
         for end, side in ((self.index_min_m, 1.0), (self.index_max_m, -1.0)):
             if self.index_m is not None and end is not None and side * (end - self.index_m) > 0.0:
                 name = 'index_min_m' if side > 0.0 else 'index_max_m'
-                raise PlanError(
+                raise PaintError(
                     f'index_m is {self.index_m:g}, beyond {name}, {end:g}; leave out one of them'
                 )
         return self
@@ -241,7 +241,7 @@ class ImproveRequest(SpeedLimits):
     def _bounds_in_order(self) -> 'ImproveRequest':
         self._require_order('film_min_um', 'film_max_um')
         if self.flow[0] > self.flow[1]:
-            raise PlanError(f'flow is {self.flow[0]:g} to {self.flow[1]:g}; swap the two')
+            raise PaintError(f'flow is {self.flow[0]:g} to {self.flow[1]:g}; swap the two')
         return self
 
 

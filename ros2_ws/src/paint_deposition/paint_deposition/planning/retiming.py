@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,21 +21,6 @@ from paint_deposition.planning.requests import ImproveRequest, PlanRequest, Spee
 ROUGH_ROUNDS = 3
 
 
-@dataclass(frozen=True)
-class Retiming:
-    """A programme with new times and openings."""
-
-    original: Programme  # the programme as it was
-    programme: Programme  # the new one
-    target_um: float  # mean film aimed at
-    binding: tuple[str, ...]  # names of all limits that bind
-    # Those of them that cost evenness, the strongest first, with sigma_n without each alone.
-    binding_limits: dict[str, float]
-    # The most even film of any densities of paint along this path, without limits and without
-    # weights for paint, time and smoothness.
-    sigma_n_of_path: float
-
-
 def retime_for_evenness(
     surface: Surface,
     wanted: WantedFilm,
@@ -44,7 +29,7 @@ def retime_for_evenness(
     request: ImproveRequest,
     progress: Callable[[str, float], None] = lambda what, share: None,
     explain: bool = True,
-) -> Retiming:
+) -> tuple[Programme, tuple[str, ...], dict[str, float], float]:
     """Choose speeds, flows and triggers along the path of a programme.
 
     The film at points spread evenly over the region where one is wanted is linear in the density
@@ -54,8 +39,14 @@ def retime_for_evenness(
     solution. The models are equally likely, the first is the best known. ``explain`` also
     determines which limits cost evenness, and how even the film along this path could be.
 
+    Returns:
+        The new programme; the names of all limits that bind; those of them that cost evenness, the
+        strongest first, with sigma_n without each alone; and sigma_n of the most even film of any
+        densities of paint along this path, without limits and without weights for paint, time and
+        smoothness.
+
     Raises:
-        PlanError: the limits contradict each other.
+        PaintError: the limits contradict each other.
     """
     rows = np.flatnonzero(wanted.region)
     rows = rows[stratified_sample(surface.vertex_areas_m2[wanted.region])]
@@ -133,7 +124,7 @@ def retime_for_evenness(
             bare = one.relaxed()
             most_even, *_ = solve(bare, near, given, ROUGH_ROUNDS)
             of_path = min(of_path, _sigma_n(bare.films_um(most_even)))
-    return Retiming(original, timed, target_um, binding, limits, of_path)
+    return timed, binding, limits, of_path
 
 
 def timed_evenly(
@@ -165,9 +156,9 @@ def timed_evenly(
         time_weight=sprayed_s / cycle_time_s * request.time_weight,
     )
     original = Programme.of(trajectory)
-    retimed = retime_for_evenness(
+    retimed, *_ = retime_for_evenness(
         surface, wanted, original, [model], asked, progress, explain=False
-    ).programme
+    )
     return retimed.trajectory(), tuple(moves_of(retimed, asked))
 
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import binary_closing, distance_transform_edt, gaussian_filter
 
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PaintError
 from paint_deposition.part.edges import (
     connected,
     edge_distance_m,
@@ -31,13 +31,13 @@ def pass_axes(
     normal.
 
     Raises:
-        PlanError: the part has no side to paint from.
+        PaintError: the part has no side to paint from.
     """
     if outward is None:
         outward = surface.vertex_areas_m2 @ surface.normals
         # Mean normals shorter than this share have no side: a closed body.
         if np.linalg.norm(outward) < 0.2 * surface.area_m2:
-            raise PlanError(
+            raise PaintError(
                 'the part is closed, it has no side to paint from; say where the gun stands '
                 '(outward)'
             )
@@ -64,7 +64,7 @@ class SurfaceMap:
         self.axes, self.radius_m, self.origin_m = axes, radius_m, surface.centre_m
         self.painted = painted_side(surface, axes[2])
         if not self.painted.any():
-            raise PlanError(
+            raise PaintError(
                 f'no surface faces the gun at {" ".join(f"{one:.2g}" for one in axes[2])} '
                 'from the part; give another direction to it (outward)'
             )

@@ -1,7 +1,6 @@
 """What the report shows, computed once from the results, and the rows of its tables."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple
 from functools import cached_property
 from itertools import pairwise, product
 from typing import Any
@@ -86,7 +85,7 @@ class ReportData:
         """Where the film measured at each point is beside its own target band; '' without one."""
         target_of, bands = self.study.campaign.target_of, []
         for one in self.experiments:
-            measured = one.means.mean_um
+            measured = one.readings.mean_um
             target, tolerance = wanted_at(measured, *target_of(one), one.zones_of_points)
             off = measured - target
             within = np.where(np.abs(off) <= tolerance, 'in', np.where(off < 0.0, 'low', 'high'))
@@ -193,7 +192,8 @@ def class_rows(data: ReportData) -> list[dict[str, Any]]:
         effect = data.effect_class(found.best)
         like = [member for member in found.members if member != found.best]
         parameters = [
-            _parameter(effect, name, *astuple(value)) for name, value in found.parameters.items()
+            _parameter(effect, name, one.value, one.low, one.high)
+            for name, one in found.parameters.items()
         ]
         accepted = data.diagnosis is not None and found.best in data.diagnosis.accepted
         learned, sure = words.is_learned(found.best), found.probability > SURE
@@ -274,7 +274,8 @@ def effect_rows(data: ReportData) -> list[dict[str, Any]]:
         found = known.get(effect.id, {})
         parameters = words.learned_rows(effect)
         for name in effect.parameters():
-            values = astuple(found[name]) if name in found else [getattr(effect, name)]
+            one = found.get(name)
+            values = (one.value, one.low, one.high) if one else (getattr(effect, name),)
             parameters.append(_parameter(type(effect), name, *values))
         change = data.changes.get(effect.id)
         rows.append({'id': effect.id, 'change': change, 'parameters': parameters})

@@ -75,7 +75,7 @@ def report_html(data: ReportData) -> str:
     content = json.dumps(plain(figures), separators=(',', ':'), allow_nan=False)
     films, git, diagnosis = film_rows(data), git_version(), data.diagnosis
     profiles, profile_legend = profile_figures(data)
-    later = {(m.experiment, m.kind, m.label): m for m in data.comparisons[-1].misfits}
+    later = data.comparisons[-1].misfits
     # What the tables begin with: the model before, or of models side by side the last.
     shown = data.comparisons[-1 if data.beside else 0]
     zone_films = {row['name']: row['film'].zones for row in films}
@@ -92,8 +92,8 @@ def report_html(data: ReportData) -> str:
         learned=law_rows(data),
         blind=blind_rows(data),
         misfits=[
-            {'before': m, 'after': later.get((m.experiment, m.kind, m.label), m)}
-            for m in shown.misfits
+            {'kind': of[1], 'label': of[2], 'before': found, 'after': later.get(of, found)}
+            for of, found in shown.misfits.items()
         ],
         shown=shown,
         of_model=f', {data.model_names[-1]}' if data.beside else '',
@@ -181,7 +181,7 @@ def point_rows(data: ReportData) -> list[dict[str, Any]]:
     scatter_um = TWO_SIDED_95 * found.sigma_um
     rows: list[dict[str, Any]] = []
     for k, experiment in enumerate(data.experiments):
-        labels, groups = experiment.readings.point[experiment.means.first], experiment.groups
+        labels, groups = experiment.readings.point[experiment.readings.first], experiment.groups
         places = 1e3 * experiment.measured_points.positions_m
         for row, point, group, place in zip(
             range(*data.rows_of(k).indices(len(data.study))), labels, groups, places, strict=True

@@ -227,8 +227,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     charts = bottom.subplots(rows, columns, squeeze=False, sharey=True)
     for chart in charts.ravel()[len(passes) :]:
         chart.set_axis_off()
-    retiming = result.retiming
-    programmes = ('before', retiming.original, BEFORE), ('after', retiming.programme, ACCENT)
+    programmes = ('before', result.original, BEFORE), ('after', result.programme, ACCENT)
     for chart, change in zip(charts.ravel(), passes, strict=False):
         begin, end = change.place_m
         places = np.linspace(begin + STANDING_M, end - STANDING_M, 121)

@@ -181,7 +181,7 @@ def write_calibration_pictures(
     panels = [panel for panel in calibration.panels if panel is not None]
     if panels:
         # Eq. (3) of a panel with its three Gaussians, and the 2D model's own collapse.
-        figure, panel, fitted = new_figure(6.4, 4.2), panels[0].panel, panels[0].collapse
+        figure, (panel, fitted) = new_figure(6.4, 4.2), panels[0]
         axes = figure.subplots()
         quiet(axes, 'across the pass [mm]', 'film [µm]', 'One pass, eq. (3)')
         x = np.linspace(-0.6, 0.6, 600) * fitted.reach_m

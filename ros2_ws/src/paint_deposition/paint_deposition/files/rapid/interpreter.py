@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
-from lark import Token
+from lark import Token, Tree
 
 from paint_deposition.errors import did_you_mean
-from paint_deposition.files.rapid.parser import Datum, Instruction, Node, Routine, line_of
+from paint_deposition.files.rapid.parser import Datum, Instruction, Routine, line_of
 from paint_deposition.files.rapid.values import Unknown, Values
 from paint_deposition.motion.programmed import Move
 
@@ -29,28 +29,13 @@ PASSED_OVER = frozenset((
 ))  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
-class RapidMove(Move):
-    """A move of the TCP as programmed; on the robot, zones cut its corners.
-
-    The pose is in the world frame, or in ``frame``: that of the work object if the modules do not
-    define it, or of the mechanical unit that moves it.
-    """
-
-    instruction: str  # in lower case
-    zone_m: float  # radius in which the corner is cut, 0: stop
-    tool: str
-    work_object: str
-    frame: str = ''  # '' for the world
-
-
 @dataclass
 class RapidProgram:
     """The moves in order, and notes on everything left out or assumed, one line each."""
 
     module: str
     gun_signal: str = ''  # the digital output that opens the gun
-    moves: list[RapidMove] = field(default_factory=list)
+    moves: list[Move] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def note(self, text: str) -> None:
@@ -98,7 +83,7 @@ class Interpreter(Values):
         self._local, self.source, self.line, self._running = caller
         for one in routine.parameters:
             node = given.get(one.name)
-            if one.shared and isinstance(node, Node) and node.rule == 'reference':
+            if one.shared and isinstance(node, Tree) and node.data == 'reference':
                 self.assign(node, own[one.name].value)
         return result
 
@@ -112,7 +97,7 @@ class Interpreter(Values):
         """All instructions in a block, and in the routines that it calls, each of these once."""
         seen = set() if seen is None else seen
         for child in node.children:
-            if isinstance(child, Node):
+            if isinstance(child, Tree):
                 yield from self.reached(child, seen)
             elif isinstance(child, Instruction):
                 routine = self.routine(child.name)
@@ -124,13 +109,13 @@ class Interpreter(Values):
 
     # --- statements
 
-    def _execute(self, block: Node) -> None:
+    def _execute(self, block: Tree) -> None:
         for statement in block.children:
             self._step()
             if isinstance(statement, Instruction):
                 self._instruction(statement)
-            elif statement.rule != 'label':  # which only GOTO needs, and that is refused
-                getattr(self, f'_{statement.rule}')(*statement.children)
+            elif statement.data != 'label':  # which only GOTO needs, and that is refused
+                getattr(self, f'_{statement.data}')(*statement.children)
 
     def _step(self, count: float = 1.0) -> None:
         """Count a statement, a turn of a loop, or a part of either."""
@@ -143,10 +128,10 @@ class Interpreter(Values):
         # An option handed on, V?v, is one if the parameter is given.
         given = {}
         for name, node in i.options.items():
-            if not (isinstance(node, Node) and node.rule == 'conditional'):
+            if not (isinstance(node, Tree) and node.data == 'conditional'):
                 given[name] = node
             elif (parameter := node.children[0]) in self._local:
-                given[name] = Node('reference', [parameter])
+                given[name] = Tree('reference', [parameter])
         i = i._replace(options=given)
         if routine := self.routine(i.name):
             self.call(routine, i.values, i.options)
@@ -174,17 +159,17 @@ class Interpreter(Values):
             if i.name.startswith('tpread') and i.values:
                 self.assign(i.values[0], Unknown(i.name, f'what {i.name} reads in line {i.line}'))
             output = i.values[0] if i.name.startswith(('set', 'reset')) and i.values else None
-            names = output.children[:1] if isinstance(output, Node) else []
+            names = output.children[:1] if isinstance(output, Tree) else []
             self.passed.setdefault(' '.join([i.name, *map(str, names)]), {})[i.line] = None
 
-    def _assignment(self, reference: Node, node: Any) -> None:
+    def _assignment(self, reference: Any, node: Any) -> None:
         self.line = reference.children[0].line
         self.assign(reference, self.value(node))
 
     def _declaration(self, *data: Datum) -> None:
         self._local |= {datum.name: replace(datum) for datum in data}
 
-    def _connect(self, word: Token, _: Node, trap: Token) -> None:
+    def _connect(self, word: Token, _: Tree, trap: Token) -> None:
         routine = self.routine(trap)
         if not routine:
             self.fail(f'trap {trap} is not declared in the modules given')
@@ -197,13 +182,13 @@ class Interpreter(Values):
             condition = word == 'else' or self.value(next(given))
             body = next(given)
             if isinstance(condition, Unknown):
-                rest = [part for part in given if isinstance(part, Node) and part.rule == 'block']
+                rest = [part for part in given if isinstance(part, Tree) and part.data == 'block']
                 return self._only_if_idle(word, condition.reason, body, *rest)
             if condition:
                 return self._execute(body)
         return None
 
-    def _while(self, word: Token, condition: Any, body: Node) -> None:
+    def _while(self, word: Token, condition: Any, body: Tree) -> None:
         leaves = any(i.name in ('return', 'exit', 'raise', 'goto') for i in self.reached(body))
         for turn in count():
             self.line = line_of(word)
@@ -238,19 +223,19 @@ class Interpreter(Values):
         self._local = outer
         return None
 
-    def _test(self, word: Token, node: Any, *cases: Node | None) -> None:
+    def _test(self, word: Token, node: Any, *cases: Any) -> None:
         self.line = line_of(word)
         value, given = self.value(node), [case for case in cases if case]
         if isinstance(value, Unknown):
             return self._only_if_idle(word, value.reason, *given)
         for case in given:
-            if case.rule == 'block':
+            if case.data == 'block':
                 return self._execute(case)
             if value in map(self.known, case.children[0]):
                 return self._execute(case.children[1])
         return None
 
-    def _only_if_idle(self, word: Token, reason: str, *bodies: Node) -> None:
+    def _only_if_idle(self, word: Token, reason: str, *bodies: Tree) -> None:
         """Pass over blocks that depend on the robot; refuse those that act on it or the gun."""
         for body in bodies:
             changed = [*_assigned(body)]
@@ -264,14 +249,14 @@ class Interpreter(Values):
                         f'{reason}; declare its value, or take the condition out'
                     )
             for reference in changed:
-                name = reference.children[0]
+                name = str(reference.children[0])
                 unknown = Unknown(name, f'{name}, which depends on {reason}')
-                self.assign(Node('reference', [name]), unknown)
+                self.assign(Tree('reference', [name]), unknown)
         self.passed.setdefault(str(word), {})[line_of(word)] = None
 
 
-def _assigned(node: Node) -> Iterator[Node]:
+def _assigned(node: Tree) -> Iterator[Tree]:
     """The references that assignments in a block change."""
     for part in node.children:
-        if isinstance(part, Node):
-            yield from part.children[:1] if part.rule == 'assignment' else _assigned(part)
+        if isinstance(part, Tree):
+            yield from part.children[:1] if part.data == 'assignment' else _assigned(part)

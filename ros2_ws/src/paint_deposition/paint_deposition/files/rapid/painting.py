@@ -12,7 +12,6 @@ from paint_deposition.files.rapid.interpreter import (
     PASSED_OVER,
     Ended,
     Interpreter,
-    RapidMove,
     RapidProgram,
 )
 from paint_deposition.files.rapid.parser import Instruction, Module, Routine, name_of
@@ -27,7 +26,7 @@ from paint_deposition.files.rapid.values import (
     product,
 )
 from paint_deposition.model.eq1_pattern import MOST
-from paint_deposition.motion.programmed import GunSwitch, in_order, track
+from paint_deposition.motion.programmed import GunSwitch, Move, in_order, track
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 OUTPUTS = ('setdo', 'set', 'reset', 'setao', 'setgo', 'pulsedo', 'invertdo')
@@ -316,7 +315,7 @@ class Painting(Interpreter):
         speed_m_per_s, duration_s = self._pace(i, speed)
         if duration_s and 0.0 < length_m < FROM_UNKNOWN_M:
             speed_m_per_s = length_m / duration_s
-        self.program.moves.append(RapidMove(
+        self.program.moves.append(Move(
             position * 1e-3, rotation.as_quat(), speed_m_per_s, wait_s=duration_s,
             via_m=via_m, line=i.line, instruction=i.name,
             zone_m=zone_m, tool=its_tool, frame=name,

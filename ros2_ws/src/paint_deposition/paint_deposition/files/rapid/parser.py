@@ -7,18 +7,11 @@ import json
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
-from lark import Lark, Token, Transformer, UnexpectedInput, v_args
+from lark import Lark, Token, Transformer, Tree, UnexpectedInput, v_args
 
 from paint_deposition.errors import RecordingError, quoted
-
-
-class Node(NamedTuple):
-    """A statement or an expression: the name of its rule in the grammar, and its parts."""
-
-    rule: str
-    children: list[Any]
 
 
 class Instruction(NamedTuple):
@@ -53,7 +46,7 @@ class Routine(NamedTuple):
 
     name: str
     parameters: list[Datum]
-    body: Node
+    body: Tree
     source: str
     is_procedure: bool
 
@@ -69,12 +62,9 @@ class Module(NamedTuple):
 
 @v_args(inline=True)
 class _Builder(Transformer):
-    """Constants, instructions and declarations as they are; all else as nodes."""
+    """Constants, instructions and declarations as they are; all else as trees."""
 
     number = float
-
-    def __default__(self, rule: str, children: list, _place: Any) -> Node:
-        return Node(str(rule), children)
 
     def numbers(self, text: str) -> list:
         return json.loads(text, parse_int=float)
@@ -94,10 +84,10 @@ class _Builder(Transformer):
     def sign(self, sign: str, value: Any) -> Any:
         if isinstance(value, float):
             return -value if sign == '-' else value
-        return Node('operation', [0.0, sign, value])
+        return Tree('operation', [0.0, sign, value])
 
     def aggregate(self, items: list) -> Any:
-        return Node('aggregate', [items]) if any(isinstance(i, Node) for i in items) else items
+        return Tree('aggregate', [items]) if any(isinstance(i, Tree) for i in items) else items
 
     def option(self, name: str, value: Any) -> dict[str, Any]:
         return {str(name): True if value is None else value}
@@ -115,8 +105,8 @@ class _Builder(Transformer):
     def datum(self, name: str, sizes: list | None, value: Any) -> Datum:
         return Datum(str(name), '', value, sizes, is_declared=True)
 
-    def declaration(self, kind: str, *data: Datum) -> Node:
-        return Node('declaration', [replace(datum, type=str(kind)) for datum in data])
+    def declaration(self, kind: str, *data: Datum) -> Tree:
+        return Tree('declaration', [replace(datum, type=str(kind)) for datum in data])
 
     def parameter(self, optional: str | None, mode: str | None, kind: str, name: str) -> Datum:
         return Datum(str(name), str(kind), optional=optional is not None, shared=mode is not None)
@@ -127,7 +117,7 @@ class _Builder(Transformer):
     def routine(self, *parts: Any) -> Routine:
         names = [str(part) for part in parts if isinstance(part, str)]
         parameters = next((part for part in parts if isinstance(part, list)), [])
-        body = next(part for part in parts if isinstance(part, Node) and part.rule == 'block')
+        body = next(part for part in parts if isinstance(part, Tree) and part.data == 'block')
         return Routine(names[-1], parameters, body, '', True)
 
     def function(self, *parts: Any) -> Routine:
@@ -143,7 +133,7 @@ def line_of(token: Token) -> int:
 
 def name_of(node: object) -> str:
     """The name that an argument consists of, '' if it is an expression."""
-    return str(node.children[0]) if isinstance(node, Node) and node.rule == 'reference' else ''
+    return str(node.children[0]) if isinstance(node, Tree) and node.data == 'reference' else ''
 
 
 @cache
@@ -159,7 +149,7 @@ def parse_modules(text: str, source: str) -> list[Module]:
         RecordingError: it is not RAPID, in one line with source, line and what is wrong there.
     """
     try:
-        (*modules,) = cast(Node, _grammar().parse(text.lower())).children
+        modules: list[Any] = [*_grammar().parse(text.lower()).children]
     except UnexpectedInput as error:
         token = getattr(error, 'token', None)
         if token is None:
@@ -173,10 +163,11 @@ def parse_modules(text: str, source: str) -> list[Module]:
     for module in modules:
         name, *scopes = module.children
         found: dict[str, list] = {'global': [], 'local': []}
-        for scope, (item, *_) in scopes:
+        for scope in scopes:
+            item = scope.children[0]
             if isinstance(item, Routine):
-                found[scope].append(item._replace(source=source))
-            elif isinstance(item, Node) and item.rule == 'declaration':
-                found[scope] += item.children
+                found[scope.data].append(item._replace(source=source))
+            elif isinstance(item, Tree) and item.data == 'declaration':
+                found[scope.data] += item.children
         read.append(Module(str(name), source, found['global'], found['local']))
     return read

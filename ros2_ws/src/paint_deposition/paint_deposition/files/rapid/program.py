@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from paint_deposition.errors import PlanError, RecordingError, quoted
+from paint_deposition.errors import PaintError, RecordingError, quoted
 from paint_deposition.files.atomic import MOST_TEXT_MB, filled, read_file
 from paint_deposition.files.rapid.interpreter import RapidProgram
 from paint_deposition.files.rapid.painting import Painting
@@ -183,18 +183,18 @@ def module_text(
     ``paint_moves`` it sprays by PaintL with SetBrush: the only brush is number 1 then, and 0
     closes the gun. `read_program` reads it back within 0.001 mm.
 
-    Raises PlanError for speeds that no robot could run, and flows that a brush does not have.
+    Raises PaintError for speeds that no robot could run, and flows that a brush does not have.
     """
     speeds = {v: f'vPass{k}' for k, v in enumerate(sorted(set(map(_speed, moves))), start=1)}
     for speed in speeds:
         if not 0.0 < speed < 10.0:
-            raise PlanError(f'speed of {speed:g} m/s: give one above 0 and below 10 m/s')
+            raise PaintError(f'speed of {speed:g} m/s: give one above 0 and below 10 m/s')
     poses = [_pose([*move.position_m, *move.quaternion_xyzw]) for move in moves]
     levels = sorted({_flow(move) for move in moves if move.spraying})
     flows = {v: f'flow{k}' for k, v in enumerate(levels, start=1)} if levels != [1.0] else {}
     brushes = sorted({move.brush for move in moves if move.spraying} - {ONLY_BRUSH})
     if paint_moves and flows:
-        raise PlanError(
+        raise PaintError(
             'flows of single passes need brushes of their own; leave out --paint-moves'
         )
     run = [('', 'MoveJ', speeds[_speed(moves[0])], '', 'fine')]

@@ -11,10 +11,11 @@ from functools import partial
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
+from lark import Tree
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError, quoted
-from paint_deposition.files.rapid.parser import Datum, Module, Node, Routine
+from paint_deposition.files.rapid.parser import Datum, Module, Routine, name_of
 from paint_deposition.request import QUATERNION_TOLERANCE
 
 # Of one array, and of all lists that are made or copied while a program runs.
@@ -185,7 +186,7 @@ class Values:
 
     def value(self, node: Any) -> Any:
         """The value of an expression; ``Unknown`` if it depends on an unknown one."""
-        return getattr(self, f'_{node.rule}')(*node.children) if isinstance(node, Node) else node
+        return getattr(self, f'_{node.data}')(*node.children) if isinstance(node, Tree) else node
 
     def known(self, node: Any) -> Any:
         """The value of an expression that must not be unknown."""
@@ -203,9 +204,10 @@ class Values:
 
     def assign(self, reference: Any, value: Any) -> None:
         """Assign a copy of a value to a datum or a part of it."""
-        if not isinstance(reference, Node) or reference.rule != 'reference':
+        name = name_of(reference)
+        if not name:
             self.fail(f'{quoted(reference)} is no name to assign to')
-        name, *parts = reference.children
+        parts = reference.children[1:]
         value = self._copied(value)
         datum = self._find(name)
         if not isinstance(datum, Datum):
@@ -252,7 +254,7 @@ class Values:
         if routine := self.routine(name):
             return self.call(routine, nodes, options)
         if name == 'present':
-            return all(node.children[0] in self._local for node in nodes if isinstance(node, Node))
+            return all(node.children[0] in self._local for node in nodes if isinstance(node, Tree))
         values = [self.value(node) for node in nodes]
         named = {option: self.value(node) for option, node in options.items()}
         if name not in FUNCTIONS:

@@ -5,7 +5,7 @@ Zones stand beside their targets as on an acceptance sheet.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -84,34 +84,18 @@ class ZoneReadings:
 
 def zone_readings(campaign: Campaign, readings: Residuals) -> tuple[ZoneReadings, ...]:
     """The zones of each experiment, by the residuals of all N readings used."""
-    owner, found = campaign.experiment_of[campaign.means.owner], []
+    owner, found = campaign.experiment_of[campaign.readings.owner], []
     for number, experiment in enumerate(campaign.experiments):
         of, own = experiment.zones_of_points, readings.select(owner == number)
         if of is None:
             continue
         points = experiment.readings.point
         for k, zone in enumerate(of.zones):
-            inside = (of.number == k)[experiment.means.owner]
+            inside = (of.number == k)[experiment.readings.owner]
             found.append(
                 ZoneReadings.of(experiment.name, zone, own.select(inside), points[inside])
             )
     return tuple(found)
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """How far the model is off on some of the readings."""
-
-    # Which readings: kind is 'experiment', 'group' or 'pass'.
-    experiment: str
-    kind: str
-    label: str
-    residuals: Residuals
-
-    def to_dict(self) -> dict[str, Any]:
-        """An entry of ``misfits`` in the files of results."""
-        of = {'experiment': self.experiment, 'kind': self.kind, 'label': self.label}
-        return of | self.residuals.figures()
 
 
 @dataclass(frozen=True)
@@ -122,7 +106,8 @@ class Comparison:
         study: the campaign, with the noise of its gauge and notes for the user.
         readings: residuals of every reading used, experiments in order.
         points: residuals of the points, averaged over repeats.
-        misfits: of each experiment, its groups and its passes.
+        misfits: residuals of each experiment, its groups and its passes, by the name of the
+            experiment, the kind ('experiment', 'group' or 'pass') and the label.
         dependences: of the residual on each covariate, by its name, strongest first: Spearman's
             rank correlation and its p-value.
         regions: where the misfit is significant, strongest first.
@@ -134,7 +119,7 @@ class Comparison:
     study: Study
     readings: Residuals
     points: Residuals
-    misfits: tuple[Misfit, ...]
+    misfits: dict[tuple[str, str, str], Residuals]
     dependences: dict[str, tuple[float, float]]
     regions: tuple[Region, ...]
     model: DepositionModel
@@ -176,7 +161,10 @@ class Comparison:
             'readings': len(self.readings),
             'noise': self.study.noise_figures,
             'left_out': [outlier.to_dict() for outlier in self.study.outliers],
-            'misfits': [misfit.to_dict() for misfit in self.misfits],
+            'misfits': [
+                dict(zip(('experiment', 'kind', 'label'), of, strict=True)) | residuals.figures()
+                for of, residuals in self.misfits.items()
+            ],
             'zones': [zone.to_dict() for zone in self.zones],
             'regions': [region.to_dict() for region in self.regions],
             'dependences': [
@@ -219,8 +207,8 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
     """Predict every reading and summarise the misfit."""
     points = study.residuals(study.forward.predict_um(model))
     campaign = study.campaign
-    predicted_um = points.predicted_um[campaign.means.owner]
-    sigma_um = np.hypot(study.noise.sigma_um, study.texture_um[campaign.means.owner])
+    predicted_um = points.predicted_um[campaign.readings.owner]
+    sigma_um = np.hypot(study.noise.sigma_um, study.texture_um[campaign.readings.owner])
     readings = Residuals(campaign.readings.thickness_um, predicted_um, sigma_um)
     dependences = {}
     for name, values in study.covariates(model).items():
@@ -229,22 +217,25 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
             dependences[name] = correlation, p_value
     strongest_first = sorted(dependences.items(), key=lambda item: item[1][1])
     return Comparison(
-        study, readings, points, tuple(_misfits(study, model, readings)),
+        study, readings, points, _misfits(study, model, readings),
         dict(strongest_first),
         tuple(misfit_regions(study, points, model)), model, zone_readings(campaign, readings),
     )  # fmt: skip
 
 
-def _misfits(study: Study, model: DepositionModel, residuals: Residuals) -> Iterator[Misfit]:
-    owner = study.campaign.means.owner
+def _misfits(
+    study: Study, model: DepositionModel, residuals: Residuals
+) -> dict[tuple[str, str, str], Residuals]:
+    owner = study.campaign.readings.owner
     experiment_of = study.campaign.experiment_of[owner]
     groups, passes = study.campaign.readings.group, study.passes(model)[owner]
+    rows = {}
     for number, experiment in enumerate(study.campaign.experiments):
         here, name = experiment_of == number, experiment.name
-        yield Misfit(name, 'experiment', name, residuals.select(here))
-        for label in dict.fromkeys(experiment.readings.group):
-            if label:
-                yield Misfit(name, 'group', str(label), residuals.select(here & (groups == label)))
+        rows[name, 'experiment', name] = here
+        for label in filter(None, dict.fromkeys(experiment.readings.group.tolist())):
+            rows[name, 'group', label] = here & (groups == label)
         painted_by = np.unique(passes[here])
         for k in painted_by if len(painted_by) > 1 else ():
-            yield Misfit(name, 'pass', f'pass {k + 1}', residuals.select(here & (passes == k)))
+            rows[name, 'pass', f'pass {k + 1}'] = here & (passes == k)
+    return {of: residuals.select(own) for of, own in rows.items()}

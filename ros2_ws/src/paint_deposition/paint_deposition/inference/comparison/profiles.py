@@ -137,9 +137,9 @@ def _film_along(
     # Beyond the first and last reading lines go on for as far as readings are apart, but not off
     # the surface by more than 3 mm. Between readings they break where they are 20 mm off it, at a
     # cut-out say, or where the nearest surface faces another way, a hem say.
-    nearest = experiment.surface.locate(line[:, :3], line[:, 3:])
-    between, off_m = (low <= at) & (at <= high), nearest.distance_m
-    facing = np.einsum('ij,ij->i', nearest.normals, line[:, 3:]) > 0.5
+    _, outward, off_m = experiment.surface.locate(line[:, :3], line[:, 3:])
+    between = (low <= at) & (at <= high)
+    facing = np.einsum('ij,ij->i', outward, line[:, 3:]) > 0.5
     on = facing & (off_m < np.where(between, 0.02, 0.003))
     at, line, on = at[between | on], line[on], on[between | on]
     slopes = any(effect.needs_slope for model in models for effect in model.effects)

@@ -57,7 +57,7 @@ def misfit_regions(study: Study, points: Residuals, model: DepositionModel) -> l
                 break
             members = places[best] > 0.0
             region = rows[members]
-            readings = int(study.campaign.means.repeats[region].sum())
+            readings = int(study.campaign.readings.repeats[region].sum())
             mean = float(np.mean(points.residual_um[region]))
             words = _described(values, region, rows, readings, mean)
             described = Region(words, experiment.name, region, readings, mean)

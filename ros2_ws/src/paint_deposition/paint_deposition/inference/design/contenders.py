@@ -7,7 +7,7 @@ beforehand: on average by their Kullback-Leibler divergence (Lindley, Ann. Math.
 1956).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -260,38 +260,34 @@ class Forecast:
         return float(probable @ left[effect].prod(axis=1))
 
 
-class Placement:
-    """The forecast of single readings, as some of them are taken one after the other."""
+def one_by_one(
+    forecast: Forecast, usable: np.ndarray
+) -> Iterator[tuple[int, tuple[int, int], tuple[float, float]]]:
+    """Readings one after the other, each where it tells the leading effect most from its rival.
 
-    def __init__(self, forecast: Forecast) -> None:
-        self.forecast = forecast
-        self._covariances = forecast.factors @ forecast.factors.transpose(0, 2, 1)
-        self._away = forecast.means - forecast.means[:, np.newaxis]  # n true, n others, Q
-        self._apart = np.abs(forecast.odds)  # log odds between each two
+    That is the explanation from which the readings so far tell it least. With each reading come
+    the two, and the standard deviations between them before and after it.
 
-    def nearest(self) -> tuple[int, int]:
-        """The leading effect, and the explanation from which the readings so far tell it least."""
-        leading = self.forecast.leading
-        others = np.arange(len(self._apart)) != leading
-        return leading, int(np.where(others, self._apart[leading], np.inf).argmin())
-
-    def separation(self, pair: tuple[int, int]) -> float:
-        """Standard deviations between two contenders by the readings so far."""
-        return float(np.sqrt(2.0 * self._apart[pair]))
-
-    def gains(self) -> np.ndarray:
-        """(n, n, Q) by how much each further reading adds to the log odds between each two."""
-        variance = np.diagonal(self._covariances, axis1=1, axis2=2)
+    Args:
+        usable: (Q,) bool, readings that may be taken; who takes them may exclude more meanwhile.
+    """
+    leading, apart = forecast.leading, np.abs(forecast.odds)  # log odds between each two
+    others = np.arange(len(apart)) != leading
+    covariances = forecast.factors @ forecast.factors.transpose(0, 2, 1)
+    away = forecast.means - forecast.means[:, np.newaxis]  # n true, n others, Q
+    while usable.any():
+        pair = leading, int(np.where(others, apart[leading], np.inf).argmin())
+        # (n, n, Q) by how much each further reading adds to the log odds between each two.
+        variance = np.diagonal(covariances, axis1=1, axis2=2)
         ratio = variance[:, np.newaxis] / variance
-        gain = 0.5 * (ratio + self._away**2 / variance - 1.0 - np.log(ratio))
-        return 0.5 * (gain + gain.transpose(1, 0, 2))
-
-    def take(self, reading: int) -> None:
-        """Take one of the readings."""
-        self._apart = self._apart + self.gains()[:, :, reading]
-        column = self._covariances[:, :, reading]
+        gain = 0.5 * (ratio + away**2 / variance - 1.0 - np.log(ratio))
+        gain = 0.5 * (gain + gain.transpose(1, 0, 2))
+        reading = int(np.argmax(np.where(usable, gain[pair], -1.0)))
+        before, apart = apart, apart + gain[:, :, reading]
+        yield reading, pair, (np.sqrt(2.0 * before[pair]), np.sqrt(2.0 * apart[pair]))
+        column = covariances[:, :, reading]
         slope = column / column[:, [reading]]
-        self._away = self._away - self._away[:, :, [reading]] * slope
-        self._covariances = self._covariances - slope[:, :, np.newaxis] * column[:, np.newaxis]
+        away = away - away[:, :, [reading]] * slope
+        covariances = covariances - slope[:, :, np.newaxis] * column[:, np.newaxis]
         # Of a reading that was taken the noise is left: the same place, read again.
-        self._covariances[:, reading, reading] += 1.0
+        covariances[:, reading, reading] += 1.0

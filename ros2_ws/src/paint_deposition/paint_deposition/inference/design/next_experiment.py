@@ -6,7 +6,8 @@ experiments that are about as good.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.design.contenders import (
     Contender,
     Forecast,
-    Placement,
     contenders_of,
+    one_by_one,
 )
 from paint_deposition.inference.design.sprays import AS_BEFORE, MENU, Change, pairs
 from paint_deposition.inference.diagnosis.proposals import (
@@ -39,16 +40,6 @@ EDGE_MARGIN_M = 0.012
 SPACING_M = 0.05
 # A point with less than this share of the mean film was hardly painted.
 PAINTED = 0.2
-
-
-@dataclass(frozen=True)
-class ScoredExperiment:
-    """A spray that was tried in the model."""
-
-    change: Change
-    spray: Spray
-    worth: float
-    spot: int | None = None
 
 
 @on_one_thread
@@ -74,24 +65,24 @@ def _sprays(study: Study, contenders: Sequence[Contender]) -> list[Spray]:
     part = study.campaign.experiments[int(by_part.argmax())]
     made = _best([_tried(study, contenders, part, change) for change in MENU])
     # Of the best single changes two at once are tried.
-    leading = [one.change for one in made[:4]]
+    leading = [change for one in made[:4] for change in MENU if (change.key,) == one.changes]
     made += _best([_tried(study, contenders, part, change) for change in pairs(leading)])
     effects = (contender.fit.model.effect(contender.name) for contender in contenders)
     families = {effect.family for effect in effects if effect is not None}
     if suits(contenders[-1].fit.model, families):
-        tried = [_tried(study, contenders, part, AS_BEFORE, spot) for spot in spots(part, 5)]
-        still = _best(tried)
-        made += still
+        tried = ((k, _tried(study, contenders, part, AS_BEFORE, k)) for k in spots(part, 5))
+        still = {spot: spray for spot, spray in tried if spray is not None}
+        made += still.values()
         if still:
             # What may be changed of a gun that stands still.
             kinds = ('roll', 'standoff', 'part', 'voltage', 'draught')
             changes = [change for change in MENU if change.kind in kinds]
-            spot = still[0].spot
+            spot = max(still, key=lambda spot: still[spot].worth)
             made += _best([_tried(study, contenders, part, change, spot) for change in changes])
-    return [one.spray for one in _best(made)[:15]]
+    return _best(made)[:15]
 
 
-def _best(tried: Sequence[ScoredExperiment | None]) -> list[ScoredExperiment]:
+def _best(tried: Sequence[Spray | None]) -> list[Spray]:
     """Experiments that can be done, best first."""
     return sorted((one for one in tried if one is not None), key=lambda one: -one.worth)
 
@@ -102,7 +93,7 @@ def _tried(
     experiment: Experiment,
     change: Change,
     spot: int | None = None,
-) -> ScoredExperiment | None:
+) -> Spray | None:
     """How well the readings would separate with this spray, None where it cannot be done.
 
     Args:
@@ -133,17 +124,13 @@ def _tried(
         return None
     forecast = Forecast.of(contenders, together, np.arange(len(together)), len(study))
     now, then = forecast.separations
-    spray = Spray(
+    return Spray(
         _in_words(study, experiment, change, stand),
         tuple(contender.name for contender in contenders), then,
         now, len(film_um), experiment.name, (*([KEY] if stand else []), *change.key.split()),
         forecast.chance, stand.peak_um if stand else float(film_um.max()),
-        float(experiment.means.mean_um.max()), stand,
+        float(experiment.readings.mean_um.max()), stand, change.cost,
     )  # fmt: skip
-    # To spray on one spot costs one unit more, and so does a film that may sag.
-    cost = change.cost + (stand is not None) + bool(spray.film_words)
-    # One unit of cost is worth this share of the chance of settling.
-    return ScoredExperiment(change, spray, spray.chance * (1.0 - 0.05 * cost), spot)
 
 
 def _together(study: Study, experiments: Sequence[Experiment]) -> Study:
@@ -175,19 +162,15 @@ def _places(study: Study, contenders: Sequence[Contender]) -> list[Place]:
         return []
     rows = np.flatnonzero(~taken)
     order = np.concatenate([np.flatnonzero(taken), rows])
-    placement = Placement(Forecast.of(contenders, together, order, len(order) - len(rows)))
+    forecast = Forecast.of(contenders, together, order, len(order) - len(rows))
     part, positions_m, film_um = part[rows], positions_m[rows], together.measured_um[rows]
     usable = film_um > PAINTED * np.mean(study.measured_um)
     places: list[Place] = []
-    while usable.any() and len(places) < 8:
-        pair = placement.nearest()
-        best = int(np.argmax(np.where(usable, placement.gains()[pair], -1.0)))
-        before = placement.separation(pair)
-        placement.take(best)
+    for best, pair, (before, after) in islice(one_by_one(forecast, usable), 8):
         names = contenders[pair[0]].name, contenders[pair[1]].name
         why = (
-            f'separates {names[0]} from {names[1]}: {before:.1f} -> '
-            f'{placement.separation(pair):.1f} standard deviations'
+            f'separates {names[0]} from {names[1]}: {before:.1f} -> {after:.1f} standard '
+            'deviations'
         )
         places.append(Place(positions_m[best], parts[part[best]].name, why, float(film_um[best])))
         near = np.linalg.norm(positions_m - positions_m[best], axis=1) < SPACING_M
@@ -204,7 +187,7 @@ def _with_candidates(study: Study, number: int, model: DepositionModel) -> Exper
     chosen = random.permutation(len(surface.vertices_m))[: 4 * count]
     points = surface.points().select(chosen)
     inside = chosen[points.edge_distance_m > EDGE_MARGIN_M][:count]
-    session = experiment.readings.session[experiment.means.first]
+    session = experiment.readings.session[experiment.readings.first]
     readings = Readings.of(
         np.vstack([here.positions_m, surface.vertices_m[inside]]),
         np.concatenate([study.measured_um[own], np.zeros(len(inside))]),

@@ -295,13 +295,9 @@ def design_at(part: UnmeasuredPart, vertices: np.ndarray) -> CandidateDesign:
     """What readings at these vertices (C,) would show."""
     study = part.study(vertices)
     fit = part.fit(study)
-    laws = [
-        sensitivity(study.forward, fit, shape, study.sigma_um)
-        for shapes in part.candidates.values()
-        for shape in shapes
-    ]
+    every = [shape for shapes in part.candidates.values() for shape in shapes]
     return CandidateDesign(
         fit.jacobian @ fit.parameters.prior.factor,
-        np.hstack([law.columns for law in laws]),
-        np.array([law.effect.id for law in laws for _ in law.names]),
+        np.hstack([sensitivity(study.forward, fit, one, study.sigma_um) for one in every]),
+        np.array([one.id for one in every for _ in one.amplitudes()]),
     )

@@ -100,10 +100,10 @@ class UnmeasuredPart:
         draws = space.null_draws(seed)
         null, draws = space.evidence(draws), draws[:, :400]
         found: dict[str, list[float]] = {}
-        for law in (e.law for e in space.explanations if e.law is not None):
+        for law in (e for e in space.explanations if e.law is not None):
             for column, side in zip(space.null.whiten(law.columns).T, law.sides, strict=True):
                 strength = float(np.linalg.norm(column))
                 direction = (-column if side < 0.0 else column) / max(strength, 1e-12)
                 chance = power_along(space, direction, np.array([strength]), null, draws)[0]
-                found.setdefault(law.effect.id, []).append(float(chance))
+                found.setdefault(law.cause, []).append(float(chance))
         return {name: float(np.mean(chances)) for name, chances in sorted(found.items())}

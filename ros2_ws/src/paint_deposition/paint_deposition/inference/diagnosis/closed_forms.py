@@ -7,7 +7,7 @@ are off alike, so they count for as many as their deviations from the best form 
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 from typing import Any
@@ -25,14 +25,19 @@ LEAST_KNOTS = 5
 
 @dataclass(frozen=True)
 class Parameter:
-    """A fitted parameter of a form with its 95 % interval, as an effect declares it."""
+    """A parameter of a form."""
 
-    value: float
-    low: float
-    high: float
-    unit: str
-    role: str
+    power: int  # of the variable's unit
     words: str
+    role: str = 'amplitude'  # 'amplitude', 0 where the form is flat, 'level' or 'shape'
+    # Of the fit, in units of the range of the variable.
+    starts: tuple[float, ...] = (0.0,)
+    bounds: tuple[float, float] = (-20.0, 20.0)
+    # As fitted, with its 95 % interval, in its unit.
+    value: float = np.nan
+    low: float = np.nan
+    high: float = np.nan
+    unit: str = ''
 
     @property
     def neutral(self) -> float:
@@ -68,52 +73,44 @@ class ClosedForm:
         return {'formula': self.formula, 'parameters': shown, 'probability': self.probability}
 
 
-@dataclass(frozen=True)
-class _Shape:
-    """A parameter of a form before it is fitted, in units of the range of the variable."""
-
-    power: int  # of the variable's unit
-    words: str
-    role: str = 'amplitude'  # 'amplitude', 0 where the form is flat, or 'shape'
-    # Of the fit.
-    starts: tuple[float, ...] = (0.0,)
-    bounds: tuple[float, float] = (-20.0, 20.0)
-
-
-_CHANGE = _Shape(0, 'change in all', starts=(-0.3, 0.3))
+_CHANGE = Parameter(0, 'change in all', starts=(-0.3, 0.3))
 # Forms by name: how they change the level, and their parameters. Those that are multiplied have
 # the level as a factor; the others are added to it, to 1 times it where the law is a factor.
 MULTIPLIED = {
     'power': (
         'exp({exponent} * log(x / {x0}))',
-        {'exponent': _Shape(0, 'exponent of the power', bounds=(-8.0, 8.0))},
+        {'exponent': Parameter(0, 'exponent of the power', bounds=(-8.0, 8.0))},
     ),
-    'exponential': ('exp({rate} * (x - {x0}))', {'rate': _Shape(-1, 'rate of the exponential')}),
+    'exponential': (
+        'exp({rate} * (x - {x0}))',
+        {'rate': Parameter(-1, 'rate of the exponential')},
+    ),
 }
 ADDED = {
-    'linear': ('{slope} * (x - {x0})', {'slope': _Shape(-1, 'slope')}),
+    'linear': ('{slope} * (x - {x0})', {'slope': Parameter(-1, 'slope')}),
     'quadratic': (
         '({slope} + {bend} * (x - {x0})) * (x - {x0})',
-        {'slope': _Shape(-1, 'slope'), 'bend': _Shape(-2, 'half the second derivative')},
+        {'slope': Parameter(-1, 'slope'), 'bend': Parameter(-2, 'half the second derivative')},
     ),
     'inverse': (
         '{share} * ({x0} / x - 1.0)',
-        {'share': _Shape(0, 'share that goes as the inverse', starts=(0.5,))},
+        {'share': Parameter(0, 'share that goes as the inverse', starts=(0.5,))},
     ),
     'saturating': (
         '{change} * (1.0 - exp(({start} - x) / {scale}))',
         {'change': _CHANGE,
-         'scale': _Shape(1, 'range within which it saturates', 'shape', (0.1, 0.4), (0.02, 3.0))},
+         'scale': Parameter(1, 'range within which it saturates', 'shape',
+                            (0.1, 0.4), (0.02, 3.0))},
     ),
     'logistic': (
         '{change} / (1.0 + exp(({start} + {middle} - x) / {width}))',
         {'change': _CHANGE,
-         'middle': _Shape(1, 'middle of the change, from where it starts', 'shape',
-                          (0.25, 0.5, 0.75), (0.01, 1.0)),
-         'width': _Shape(1, 'width of the change', 'shape', (0.06, 0.2), (0.02, 1.0))},
+         'middle': Parameter(1, 'middle of the change, from where it starts', 'shape',
+                             (0.25, 0.5, 0.75), (0.01, 1.0)),
+         'width': Parameter(1, 'width of the change', 'shape', (0.06, 0.2), (0.02, 1.0))},
     ),
 }  # fmt: skip
-FORMS: dict[str, tuple[str, dict[str, _Shape]]] = {'constant': ('', {})} | MULTIPLIED | ADDED
+FORMS: dict[str, tuple[str, dict[str, Parameter]]] = {'constant': ('', {})} | MULTIPLIED | ADDED
 # What a form need not say where it is about 0 or 1.
 IDLE = {'(x - 0.0)': 'x', '(0.0 - x)': '-x', '(0.0 + ': '(', '(x / 1.0)': '(x)'}
 
@@ -231,7 +228,7 @@ def _described(
     form, code, fit = fitted
     # The 95 % interval.
     half = 1.96 * np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)) / weight)
-    level = _Shape(0, 'level of the law; the pattern can take it up', 'amplitude')
+    level = Parameter(0, 'level of the law; the pattern can take it up')
     parameters = {}
     for key, shape, value, away in zip(
         _names(form, unit, addition), [level, *FORMS[form][1].values()], fit.x, half, strict=True
@@ -240,9 +237,10 @@ def _described(
         in_um = addition and shape.role == 'amplitude' and (form in ADDED or shape is level)
         of_unit = _unit(unit, shape.power, in_um)[1]
         low = value - away if role != 'shape' else max(value - away, 0.0)
-        parameters[key] = Parameter(
-            float(value), float(low), float(value + away), of_unit, role, shape.words
-        )
+        parameters[key] = replace(
+            shape, role=role, value=float(value), low=float(low), high=float(value + away),
+            unit=of_unit,
+        )  # fmt: skip
     formula = re.sub(r'exp\((\w+) \* log\((.+?)\)\)', r'(\2)^\1', code).replace('(x)', 'x')
     formula = re.sub(r'\bx\b', name, re.sub(r'\b(\d+)\.0\b', r'\1', formula))
     kind = 'addition [um]' if addition else 'factor'

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -24,53 +25,47 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
     flux_around,
     footprint_basis,
 )
+from paint_deposition.inference.fitting.forward import derivatives_by_pattern
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.random_effects import smooth
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PlanarPattern
 
-
-@dataclass(frozen=True)
-class DiscrepancyPrior:
-    """What is believed of the discrepancy before the readings.
-
-    The sources are sprays of two flat-fan nozzles at three heights, each measured several times
-    (sprays of one setting differ by 0.5 to 5 % of the peak, a third as much where the film is a
-    twentieth of it), and 40 panels of clearcoat. Shares are standard deviations.
-    """
-
+# What is believed of the discrepancy before the readings. The sources are sprays of two flat-fan
+# nozzles at three heights, each measured several times (sprays of one setting differ by 0.5 to 5 %
+# of the peak, a third as much where the film is a twentieth of it), and 40 panels of clearcoat.
+# Shares are standard deviations.
+PRIOR = SimpleNamespace(
     # Shares of its peak by which the footprint may deviate at any place. What a footprint explains
     # as well is not taken for an effect; the readings tell which share it is.
-    footprints: tuple[float, ...] = (0.02, 0.06, 0.2)
+    footprints=(0.02, 0.06, 0.2),
     # The same for the difference between its two sides: 0.5 to 2 % were measured.
-    sides: float = 0.02
+    sides=0.02,
     # Power of the Gaussians' exponents in the tails: off from 1 by so much.
-    tails: float = 0.5
+    tails=0.5,
     # Most of itself by which the flux is off.
-    most_of_flux: float = 1.0
+    most_of_flux=1.0,
     # Sizes of fields, as shares of the part's thickest film, and the prior of each: its median,
     # and the factor that is one standard deviation. They fall with the root of the film.
-    settings: tuple[float, ...] = (0.006, 0.02, 0.06)
-    usual_setting: tuple[float, float] = (0.02, 2.0)
-    parts: tuple[float, ...] = (0.003, 0.01, 0.03)
-    usual_part: tuple[float, float] = (0.012, 2.0)
+    settings=(0.006, 0.02, 0.06),
+    usual_setting=(0.02, 2.0),
+    parts=(0.003, 0.01, 0.03),
+    usual_part=(0.012, 2.0),
     # Most by which usual sprays differ, and what no nature does: something unknown.
-    most_usual: float = 0.02
-    beyond_nature: float = 0.15
+    most_usual=0.02,
+    beyond_nature=0.15,
     # Lengths of correlation: of fields in root mean square radii of the pattern, of the footprint
     # in shares of its radius; a fan ends sharply.
-    lengths: tuple[float, ...] = (0.1, 0.2, 0.6)
-    footprint_lengths: tuple[float, ...] = (0.1, 0.3)
+    lengths=(0.1, 0.2, 0.6),
+    footprint_lengths=(0.1, 0.3),
     # Factor by which the size of a bell's footprint's deviations differs between jobs.
-    footprint_between_jobs: float = 1.5
+    footprint_between_jobs=1.5,
     # The pattern differs between settings by this share of what it differs between jobs, and moves
     # sideways by this share of its root mean square radius: 0.01 to 0.03 were measured.
-    of_jobs: float = 1.0 / 3.0
-    sideways: float = 0.02
-
-
-PRIOR = DiscrepancyPrior()
+    of_jobs=1.0 / 3.0,
+    sideways=0.02,
+)
 # Knots along the radius of a footprint.
 FINE_RADII = 20
 
@@ -131,8 +126,9 @@ class Footprints:
         of_film = basis.film_um / study.sigma_um[:, np.newaxis]
         # Both are of the flux alone: effects would bend the one and not the other.
         bare = fit.parameters.pattern.jacobian(fit.vector[: len(fit.parameters.pattern)])
-        terms = study.forward.terms(fit.model.model_copy(update={'effects': ()}))
-        pattern = terms.derivatives_um() @ bare / study.sigma_um[:, np.newaxis]
+        readings_of = study.forward.of_weights(fit.model.model_copy(update={'effects': ()}))
+        by_pattern = derivatives_by_pattern(readings_of, fit.model.patterns)
+        pattern = by_pattern @ bare / study.sigma_um[:, np.newaxis]
         columns, laws = [], []
         for size in PRIOR.footprints:
             of_wave = np.where(HARMONICS % 2, min(size, PRIOR.sides), size)

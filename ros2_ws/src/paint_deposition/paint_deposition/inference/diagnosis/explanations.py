@@ -33,37 +33,6 @@ from paint_deposition.inference.readings.covariates import varies
 STEP = 0.25
 
 
-@dataclass(frozen=True)
-class Sensitivity:
-    """Sensitivity of the readings to one effect, for one choice of its shape parameters."""
-
-    effect: Effect  # at the point of linearisation
-    names: tuple[str, ...]  # of the n amplitudes
-    # (P, n) derivative of the readings by each amplitude in its typical size, over the noise.
-    columns: np.ndarray
-    # (n,) bounds of the amplitudes, from neutral, in typical sizes.
-    low: np.ndarray
-    high: np.ndarray
-
-    @property
-    def sides(self) -> np.ndarray:
-        """(n,) +1 where only growth above neutral is physical, -1 below, 0 either."""
-        return 1.0 * (self.low >= 0.0) - 1.0 * (self.high <= 0.0)
-
-    def with_amplitudes(self, amounts: np.ndarray) -> Effect:
-        """The effect with amplitudes (n,) in their typical sizes, within its bounds."""
-        info = type(self.effect).parameters()
-        values = {
-            name: float(np.clip(
-                info[name]['neutral'] + info[name]['typical'] * amount,
-                info[name]['low'],
-                info[name]['high'],
-            ))
-            for name, amount in zip(self.names, amounts, strict=True)
-        }  # fmt: skip
-        return self.effect.model_copy(update=values)
-
-
 def neutral_shapes(effect: type[Effect]) -> list[Effect]:
     """The effect at neutral amplitude, for a few values of its shape parameters."""
     info = effect.parameters()
@@ -105,23 +74,20 @@ def sensitivity_um(
     return (moved[0] - predicted_um) / (STEP if ends[0] > here else -STEP)
 
 
-def sensitivity(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray) -> Sensitivity:
-    """Differentiate the prediction by the effect's amplitudes at the fitted model.
+def sensitivity(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray) -> np.ndarray:
+    """(P, n) derivative of the readings by an effect's n amplitudes at the fitted model.
+
+    Each is for an amplitude in its typical size, over the noise.
 
     Args:
         effect: neutral, or as it is in the fitted model.
         sigma_um: (P,) standard deviation of the points [um].
     """
-    info = type(effect).parameters()
-    names = type(effect).amplitudes()
-    columns, lows, highs = [], [], []
     base = forward.predict_um(fit.model.with_effect(effect))
-    for name in names:
-        neutral, typical = info[name]['neutral'], info[name]['typical']
-        columns.append(sensitivity_um(forward, fit.model, effect, name, base) / sigma_um)
-        lows.append((info[name]['low'] - neutral) / typical)
-        highs.append((info[name]['high'] - neutral) / typical)
-    return Sensitivity(effect, names, np.column_stack(columns), np.array(lows), np.array(highs))
+    return np.column_stack([
+        sensitivity_um(forward, fit.model, effect, name, base) / sigma_um
+        for name in effect.amplitudes()
+    ])  # fmt: skip
 
 
 UNKNOWN, FOOTPRINT, PLACE = 'unknown', 'footprint', 'place'
@@ -154,8 +120,9 @@ class Explanation:
     columns: np.ndarray  # (P, n) directions over the noise, for amplitudes of unit variance
     sides: np.ndarray  # (n,) +1 or -1 where physics fixes the sign of an amplitude, else 0
     share: float  # prior share of this explanation among those of its cause
-    # Of an effect; its directions are ``columns``. None for a law of any form.
-    law: Sensitivity | None = None
+    # The effect in one of its shapes, by whose amplitudes the directions are the derivatives; None
+    # for a law of any form.
+    law: Effect | None = None
     # The law of any form whose amplitudes the directions are, or None.
     random: RandomLaw | None = None
     corrects: str = ''  # id of the effect whose law it corrects, if it does
@@ -190,8 +157,11 @@ def of_effects(
         if fit.model.effect(name) is not None:
             continue
         for shape in shapes:
-            law = sensitivity(study.forward, fit, shape, study.sigma_um)
-            yield Explanation(name, law.columns, law.sides, 1.0 / len(shapes), law)
+            columns = sensitivity(study.forward, fit, shape, study.sigma_um)
+            low, high = shape.amplitude_bounds()
+            # Only growth above neutral may be physical, or below.
+            sides = 1.0 * (low >= 0.0) - 1.0 * (high <= 0.0)
+            yield Explanation(name, columns, sides, 1.0 / len(shapes), shape)
 
 
 def nonparametric_laws_of(study: Study, model: DepositionModel) -> list[Explanation]:

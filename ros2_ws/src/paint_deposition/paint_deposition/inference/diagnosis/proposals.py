@@ -13,9 +13,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.common_film import ONE_FILM
-from paint_deposition.inference.diagnosis.explanations import Sensitivity
+from paint_deposition.inference.diagnosis.explanations import Explanation
 from paint_deposition.inference.diagnosis.model_space import EffectEvidence
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path_builder import spray_path
@@ -79,7 +80,7 @@ class StationarySpray:
             return None
         return StationarySpray(
             points.positions_m[row], normal, across / np.linalg.norm(across), standoff, dwell,
-            flow, float(experiment.means.mean_um[row]), rate * dwell, brush,
+            flow, float(experiment.readings.mean_um[row]), rate * dwell, brush,
         )  # fmt: skip
 
     def sprayed(self, experiment: Experiment) -> Experiment:
@@ -169,6 +170,15 @@ class Spray:
     peak_um: float = float('nan')  # thickest film at these points
     peak_now_um: float = float('nan')  # as measured on that part
     stand: StationarySpray | None = None  # where the gun stands still, if it does
+    cost: float = 0.0  # of what is done otherwise: 1 for an entry in the programme
+
+    @property
+    def worth(self) -> float:
+        """The chance, less for what it costs."""
+        # To spray on one spot costs one unit more, and so does a film that may sag.
+        cost = self.cost + (self.stand is not None) + bool(self.film_words)
+        # One unit of cost is worth this share of the chance of settling.
+        return self.chance * (1.0 - 0.05 * cost)
 
     @property
     def film_words(self) -> str:
@@ -209,33 +219,36 @@ Testability = tuple[tuple[str, ...], dict[str, dict[str, float]]]
 
 def testability(space: EffectEvidence, seed: int) -> Testability:
     """Ids of effects that do not show, and detectable amplitudes of the others by parameter."""
-    shapes: dict[str, list[Sensitivity]] = {}
+    shapes: dict[type[Effect], list[Explanation]] = {}
     for explanation in space.explanations:
         if explanation.law is not None:
-            shapes.setdefault(explanation.cause, []).append(explanation.law)
+            shapes.setdefault(type(explanation.law), []).append(explanation)
     draws = space.null_draws(seed)
     null, draws = space.evidence(draws), draws[:, :DRAWS]
     not_testable, detectable = [], {}
-    for effect_id, found in shapes.items():
-        most = [np.maximum(np.abs(s.low), np.abs(s.high)) for s in found]
+    for effect, found in shapes.items():
+        most = np.abs(effect.amplitude_bounds()).max(axis=0)
         # Along the combination of amplitudes that shows most.
-        seen = (space.null.whiten(s.columns * m) for s, m in zip(found, most, strict=True))
+        seen = (space.null.whiten(s.columns * most) for s in found)
         # An effect counts as testable from this signal-to-noise ratio on, at the largest amplitude
         # that is physical and with the pattern refitted.
         if max(np.linalg.norm(columns, 2) for columns in seen) >= 2.0:
-            detectable[effect_id] = _detectable(space, found, null, draws)
+            detectable[effect.id] = _detectable(space, effect, found, null, draws)
         else:
-            not_testable.append(effect_id)
+            not_testable.append(effect.id)
     return tuple(not_testable), detectable
 
 
 def _detectable(
-    space: EffectEvidence, shapes: list[Sensitivity], null: np.ndarray, draws: np.ndarray
+    space: EffectEvidence,
+    effect: type[Effect],
+    shapes: list[Explanation],
+    null: np.ndarray,
+    draws: np.ndarray,
 ) -> dict[str, float]:
     """Smallest detectable amplitudes, for the shape that shows best, where physically possible."""
-    info = type(shapes[0].effect).parameters()
-    found = {}
-    for k, name in enumerate(shapes[0].names):
+    info, found = effect.parameters(), {}
+    for k, name in enumerate(effect.amplitudes()):
         columns = [space.null.whiten(s.columns[:, [k]])[:, 0] for s in shapes]
         best = max(columns, key=lambda column: float(np.linalg.norm(column)))
         strength = float(np.linalg.norm(best))

@@ -24,13 +24,12 @@ from paint_deposition.inference.diagnosis.proposals import Testability
 from paint_deposition.inference.diagnosis.verdict import (
     Diagnosis,
     EffectClass,
-    Interval,
     Step,
     Unknown,
     Verdict,
 )
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
-from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, estimates
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, Estimate, estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.posterior import prior_for
@@ -245,14 +244,11 @@ class DiagnosisState:
         )
 
 
-def intervals(fit: Fit, effect_id: str) -> dict[str, Interval]:
-    """95 % intervals of an effect's amplitudes, within what is physical."""
-    found = {}
-    for estimate in estimates(fit.marginal):
-        owner, _, parameter = estimate.name.partition('.')
-        if owner == effect_id:
-            found[parameter] = Interval(estimate.value, estimate.low, estimate.high)
-    return found
+def intervals(fit: Fit, effect_id: str) -> dict[str, Estimate]:
+    """An effect's parameters by name, with 95 % intervals within what is physical."""
+    every = {estimate.name: estimate for estimate in estimates(fit.marginal)}
+    of = f'{effect_id}.'
+    return {name.removeprefix(of): one for name, one in every.items() if name.startswith(of)}
 
 
 def trouble_with(study: Study, fit: Fit) -> str:

@@ -15,7 +15,7 @@ from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.model_space import ALPHA
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
-from paint_deposition.inference.fitting.estimates import DiscrepancyFigures
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, Estimate
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.panel import Panel
 from paint_deposition.inference.fitting.parameters import Posterior
@@ -35,22 +35,13 @@ def percent(probability: float) -> str:
 
 
 @dataclass(frozen=True)
-class Interval:
-    """A parameter's value with its 95 % interval, in its own unit."""
-
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
 class EffectClass:
     """Effects that these readings cannot tell apart."""
 
     members: tuple[str, ...]  # ids, most probable first
     probability: float  # that one of them is missing
     best: str  # id of the most probable member
-    parameters: dict[str, Interval] = field(default_factory=dict)  # of the best member, by name
+    parameters: dict[str, Estimate] = field(default_factory=dict)  # of the best member, by name
     # Before and after adding the best member, on points left out.
     holdout_rmse_um: dict[str, float] = field(default_factory=dict)
 
@@ -73,7 +64,9 @@ class Unknown:
     def __str__(self) -> str:
         against = f'most against {self.covariate}' if self.is_clear else ''
         if not self.part:
-            return f'It shows {against}; {self.where}.' if against else f'{self.where.capitalize()}.'
+            return (
+                f'It shows {against}; {self.where}.' if against else f'{self.where.capitalize()}.'
+            )
         more, since = 'more' if self.mean_residual_um > 0.0 else 'less', ''
         on = f'on {", ".join(self.parts)}' if len(self.parts) > 1 else ''
         if self.since:
@@ -230,15 +223,12 @@ class Diagnosis:
     @cached_property
     def worse(self) -> tuple[str, ...]:
         """Parts, rows and columns that the newest model predicts worse, a phrase each."""
-        old, new = (
-            [misfit for misfit in comparison.misfits if misfit.kind in ('experiment', 'group')]
-            for comparison in (self.comparisons[0], self.comparisons[-1])
-        )
+        after = self.comparisons[-1].misfits
         return tuple(
-            f'{now.experiment}{"" if now.kind == "experiment" else f", {now.label}"}: '
-            f'{before.residuals.rmse_um:.2f} -> {now.residuals.rmse_um:.2f} µm'
-            for before, now in zip(old, new, strict=True)
-            if is_worse(before.residuals, now.residuals)
+            f'{name}{"" if kind == "experiment" else f", {label}"}: '
+            f'{before.rmse_um:.2f} -> {after[name, kind, label].rmse_um:.2f} µm'
+            for (name, kind, label), before in self.comparisons[0].misfits.items()
+            if kind in ('experiment', 'group') and is_worse(before, after[name, kind, label])
         )
 
     @property
@@ -273,7 +263,11 @@ class Diagnosis:
         places, sprays = self.proposals
         classes = []
         for found in self.classes:
-            classes.append(asdict(found))
+            ends = {
+                name: {'value': one.value, 'low': one.low, 'high': one.high}
+                for name, one in found.parameters.items()
+            }
+            classes.append(asdict(found) | {'parameters': ends})
             law = self.model.effect(found.best)
             if isinstance(law, LearnedLaw):
                 classes[-1]['forms'] = [form.to_dict() for form in forms_of(law)]

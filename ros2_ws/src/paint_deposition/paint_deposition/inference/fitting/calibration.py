@@ -27,7 +27,6 @@ from paint_deposition.inference.fitting.estimates import (
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
 from paint_deposition.inference.fitting.panel import (
     Panel,
-    PanelFit,
     check_panel,
     fit_collapse,
     shifts,
@@ -44,6 +43,7 @@ from paint_deposition.inference.readings.plausibility import (
     geometry_by_experiment,
 )
 from paint_deposition.inference.readings.readings import Residuals
+from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
 
 # Residuals beyond this many standard deviations are named in a warning.
 OUTLIER_SIGMAS = 4.0
@@ -59,7 +59,8 @@ class Calibration:
         study: the campaign, ready for inference. fit: the fit of all parameters.
         parameters: of the pattern and of varied effects, with uncertainties.
         correlations: of pairs, strongest first.
-        panels: one-dimensional fit of each experiment, None where it is no flat panel.
+        panels: of each experiment where its points lie and eq. (3) fitted to them, None where it
+            is no flat panel.
         warnings: a sentence each.
         discrepancy: what no pattern explains; None until it is estimated.
         shifts: (n, k) of the fit's vector without the readings at the ends of panels that do not
@@ -71,7 +72,7 @@ class Calibration:
     parameters: tuple[Estimate, ...]
     correlations: dict[tuple[str, str], float]
     residuals: tuple[Residuals, ...]
-    panels: tuple[PanelFit | None, ...]
+    panels: tuple[tuple[Panel, ThreeGaussianCollapse] | None, ...]
     warnings: tuple[str, ...]
     shifts: np.ndarray
     discrepancy: DiscrepancyFigures | None = None
@@ -106,7 +107,10 @@ class Calibration:
                 }
                 for experiment, own in zip(study.campaign.experiments, self.residuals, strict=True)
             ],
-            'collapse': [None if panel is None else panel.to_dict() for panel in self.panels],
+            'collapse': [
+                fitted and fitted[0].figures(fitted[1], own.measured_um)
+                for fitted, own in zip(self.panels, self.residuals, strict=True)
+            ],
             'brushes': brush_figures(self.model, self.parameters),
             'points': len(study),
             'readings': len(study.campaign.readings),
@@ -168,7 +172,7 @@ def calibrate(
             f'readings at {len(study)} points; the pattern has 7 parameters, measure at least '
             f'{FEWEST_POINTS} points, better 30'
         )
-    owner = study.campaign.experiment_of[study.campaign.means.owner]
+    owner = study.campaign.experiment_of[study.campaign.readings.owner]
     for number, experiment in enumerate(study.campaign.experiments):
         check_readings(experiment.readings, study.noise.sigma_um[owner == number])
     progress('looking for outliers among the readings')
@@ -190,17 +194,17 @@ def calibrate(
         return min(fits, key=lambda fit: fit.objective)
 
     fit = best_fit(study)
-    reaches = short_reaches(study.campaign, fit.model)
-    moved = shifts(study, fit, reaches, best_fit)
+    short = short_reaches(study.campaign, fit.model)
+    moved = shifts(study, fit, short, best_fit)
     values, pairs = estimates(fit.marginal, moved), correlations(fit.marginal, moved)
     widened = 'the intervals are widened by what the fit changes without the readings at the ends'
     warnings = [*_warnings(study, fit, values, pairs), *impossible_brushes(fit.model)]
-    warnings += [f'{reach}; {widened}' for reach in reaches]
+    warnings += [f'{reach}; {widened}' for reach in short.values()]
     residuals = study.residuals_by_experiment(fit.predicted_um)
     return Calibration(study, fit, values, pairs, residuals, panels, tuple(warnings), moved)
 
 
-def _panel_fit(study: Study, number: int) -> PanelFit | None:
+def _panel_fit(study: Study, number: int) -> tuple[Panel, ThreeGaussianCollapse] | None:
     experiment = study.campaign.experiments[number]
     panel = Panel.of(experiment)
     if panel is None:
@@ -208,12 +212,14 @@ def _panel_fit(study: Study, number: int) -> PanelFit | None:
     rows = study.campaign.experiment_of == number
     measured, sigma = study.measured_um[rows], study.sigma_um[rows]
     check_panel(experiment.readings, panel, measured, sigma)
-    fitted = fit_collapse(panel, measured, sigma)
-    check_units_against_fit(experiment.readings, measured, fitted.residuals.predicted_um)
-    return fitted
+    collapse = fit_collapse(panel, measured, sigma)
+    check_units_against_fit(experiment.readings, measured, panel.film_um(collapse))
+    return panel, collapse
 
 
-def _guessed(model: DepositionModel, panels: Sequence[PanelFit]) -> DepositionModel:
+def _guessed(
+    model: DepositionModel, panels: Sequence[tuple[Panel, ThreeGaussianCollapse]]
+) -> DepositionModel:
     """First values of each pattern from the first panel of its brush, as in the paper.
 
     The greater offset radius is the ring's, the greatest standard deviation that of both
@@ -221,8 +227,7 @@ def _guessed(model: DepositionModel, panels: Sequence[PanelFit]) -> DepositionMo
     right by the fit.
     """
     patterns, projection = list(model.patterns), model.projection
-    for fitted in reversed(panels):
-        panel, collapse = fitted.panel, fitted.collapse
+    for panel, collapse in reversed(panels):
         shrink = projection.model_plane_m / (panel.distance_m + projection.emission_offset_m)
         sigma = float(np.clip(collapse.sigmas_m.max() * shrink, 0.01, 0.8))
         r = float(np.clip(max(collapse.r1_m, collapse.r2_m) * shrink, 0.0, 0.9))
@@ -247,7 +252,7 @@ def _warnings(
         )
     elif len(far):
         campaign, worst = study.campaign, np.argmax(away)
-        label = campaign.readings.point[campaign.means.first[worst]]
+        label = campaign.readings.point[campaign.readings.first[worst]]
         warnings.append(
             f'{len(far)} of {len(study)} points are off by more than {OUTLIER_SIGMAS:g} standard '
             f"deviations, most of all point '{label}': measure there again"

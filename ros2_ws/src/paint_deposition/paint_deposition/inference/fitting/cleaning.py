@@ -81,7 +81,7 @@ def _cleaned(
     # accepted: a coarser one looks like anything that is missing from the model and narrower than
     # the distance between readings.
     if study.noise.source != 'assumed':
-        share = misfit.leave_one_out.texture_share
+        share = misfit.texture_share
         if share < TEXTURE_SHARE:
             study = replace(study, estimated_texture=share)
             fit = _fitted(study, fit.model, 1, seed, known)
@@ -99,8 +99,8 @@ def _fitted(
 
 
 def _outliers(study: Study, fit: Fit, misfit: FittedPoints) -> dict[int, Outlier]:
-    means = study.campaign.means
-    label = study.campaign.readings.point[means.first]
+    readings = study.campaign.readings
+    label = readings.point[readings.first]
     film = study.measured_um
     return {
         row: Outlier(
@@ -108,7 +108,7 @@ def _outliers(study: Study, fit: Fit, misfit: FittedPoints) -> dict[int, Outlier
             sigma_um, *(() if other is None else (str(label[other]), float(film[other]))),
         )
         for row, (residual_um, sigma_um, other) in
-        find_outliers(misfit, means.repeats == 1).items()
+        find_outliers(misfit, readings.repeats == 1).items()
     }  # fmt: skip
 
 
@@ -133,7 +133,7 @@ def thinned(campaign: Campaign, seed: int) -> Campaign:
     """The campaign with as many points of each part as it may have cells."""
     random, parts = np.random.default_rng(seed), campaign.experiments
     kept = [
-        np.isin(part.means.owner, random.choice(len(part), cells, replace=False))
+        np.isin(part.readings.owner, random.choice(len(part), cells, replace=False))
         for part, cells in zip(parts, cells_by_part([*map(len, parts)]), strict=True)
     ]
     return campaign.without(~np.concatenate(kept))
@@ -149,9 +149,9 @@ def condensed(campaign: Campaign, model: DepositionModel) -> Campaign:
     Raises:
         ReadingsError: readings so far apart that they do not show how they scatter.
     """
-    predicted_um = Forward(campaign, model.effects).predict_um(model)[campaign.means.owner]
+    predicted_um = Forward(campaign, model.effects).predict_um(model)[campaign.readings.owner]
     off_um = campaign.readings.thickness_um - predicted_um
-    owner = campaign.experiment_of[campaign.means.owner]
+    owner = campaign.experiment_of[campaign.readings.owner]
     shares = cells_by_part([*map(len, campaign.experiments)])
     parts = []
     for k, (part, most) in enumerate(zip(campaign.experiments, shares, strict=True)):
@@ -169,7 +169,7 @@ def _in_cells(part: Experiment, off_um: np.ndarray, most: int) -> Experiment:
     """A part with so many cells at the most, and (N,) how far readings are off as the film."""
     readings, points = part.readings, part.measured_points
     kind = np.unique([readings.session, readings.group], axis=1, return_inverse=True)[1].ravel()
-    place_m, normals = (v[part.means.owner] for v in (points.positions_m, points.normals))
+    place_m, normals = (v[part.readings.owner] for v in (points.positions_m, points.normals))
     cell = _cells(place_m, kind, most)
     count, first = np.bincount(cell), np.unique(cell, return_index=True)[1]
 

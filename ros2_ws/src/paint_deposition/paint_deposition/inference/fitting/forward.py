@@ -2,9 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -28,6 +26,8 @@ from paint_deposition.part.points import SurfacePoints
 LAWS = ('flux_factor', 'pattern_scale')
 # Effects on film and gauge are differentiated by a step of this share of a unit.
 STEP = 1e-4
+# (P,) gauge readings [um] for (7 B,) weights of the films' terms, see ``layout.term_weights``.
+OfWeights = Callable[[np.ndarray], np.ndarray]
 
 
 class Forward:
@@ -42,8 +42,8 @@ class Forward:
         self.campaign, self.effects = campaign, effects
         # A model without one of them has it absent; what cannot be absent is not in its kernel.
         absent = (effect.absent for effect in effects if effect.acts(*LAWS))
-        self._in_kernel = {effect.id: effect for effect in absent if effect.is_neutral}
-        self._parts = [_Part(experiment) for experiment in campaign.experiments]
+        in_kernel = {effect.id: effect for effect in absent if effect.is_neutral}
+        self._parts = [_Part(experiment, in_kernel) for experiment in campaign.experiments]
         # Where the integral is short, threads wait for each other longer than for it.
         rays = sum(len(experiment) * len(experiment.path) for experiment in campaign.experiments)
         threads = min(THREADS, len(self._parts)) if rays > FEW_RAYS else 1
@@ -51,82 +51,49 @@ class Forward:
 
     def predict_um(self, model: DepositionModel) -> np.ndarray:
         """(P,) gauge readings that the model predicts [um], experiments one after the other."""
-        stages = self._stages(model)
-        return self._gauge_reading_um(self._each(_Part.film_um, stages), stages)
+        models = self._models(model)
+        return self._gauge_reading_um(self._each(_Part.film_um, models), models)
 
-    def terms(self, model: DepositionModel) -> 'Terms':
-        """What the readings are made of, for r, sigma1, sigma2 and the effects of a model."""
-        stages = self._stages(model)
-        terms = self._each(_Part.terms, stages)
-        return Terms(model, lambda w: self._gauge_reading_um([w @ part for part in terms], stages))
+    def of_weights(self, model: DepositionModel) -> OfWeights:
+        """The readings by the pattern's gains, for r, sigma1, sigma2 and effects of a model."""
+        models = self._models(model)
+        terms = self._each(_Part.terms, models)
+        return lambda w: self._gauge_reading_um([w @ part for part in terms], models)
 
     def _each(
-        self, work: Callable[['_Part', '_Stages'], np.ndarray], stages: list['_Stages']
+        self, work: Callable[['_Part', DepositionModel], np.ndarray], models: list[DepositionModel]
     ) -> list[np.ndarray]:
-        return list((self._pool.map if self._pool else map)(work, self._parts, stages))
+        return list((self._pool.map if self._pool else map)(work, self._parts, models))
 
-    def _gauge_reading_um(self, films_um: list[np.ndarray], stages: list['_Stages']) -> np.ndarray:
+    def _gauge_reading_um(
+        self, films_um: list[np.ndarray], models: list[DepositionModel]
+    ) -> np.ndarray:
         return np.concatenate([
             part.gauge_reading_um(film, one)
-            for part, film, one in zip(self._parts, films_um, stages, strict=True)
+            for part, film, one in zip(self._parts, films_um, models, strict=True)
         ])  # fmt: skip
 
-    def _stages(self, model: DepositionModel) -> list['_Stages']:
+    def _models(self, model: DepositionModel) -> list[DepositionModel]:
         """The model of each part: without the effects of what was switched off."""
-        off = [part.experiment.switched_off for part in self._parts]
-        stages = {each: self._split_by_stage(model.without(each)) for each in set(off)}
-        return [stages[each] for each in off]
-
-    def _split_by_stage(self, model: DepositionModel) -> '_Stages':
-        acting = tuple(effect for effect in model.effects if not effect.is_neutral)
-        # What effects change before the film has arrived must be integrated again.
-        early = ('on_path', 'widening', 'shadow', *LAWS)
-        before = tuple(effect for effect in acting if effect.acts(*early))
-        if any(effect.acts(*LAWS) for effect in before):
-            # All laws in a fixed order, absent ones neutral: one kernel, beside that without laws.
-            laws = self._in_kernel | {e.id: e for e in before if e.acts(*LAWS)}
-            before = (*(e for e in before if not e.acts(*LAWS)), *laws.values())
-        return _Stages(
-            model.model_copy(update={'effects': before}),
-            tuple(effect for effect in acting if effect.acts('on_film', 'on_gauge')),
-            any(effect.needs_slope for effect in model.effects),
-        )
+        return [model.without(part.experiment.switched_off) for part in self._parts]
 
 
-@dataclass(frozen=True)
-class Terms:
-    """The readings as a function of the pattern's gains, for one r, sigma1 and sigma2."""
-
-    model: DepositionModel  # whose shape and effects they are
-    # (P,) gauge readings [um] for (7 B,) weights of the films' terms, by brush.
-    predict_um: Callable[[np.ndarray], np.ndarray]
-
-    def with_gains_um(self, patterns: Sequence[PlanarPattern]) -> np.ndarray:
-        """(P,) readings [um] with the gains K1, K2, K3 and phi of patterns of these shapes."""
-        return self.predict_um(np.concatenate([term_weights(p)[0] for p in patterns]))
-
-    def derivatives_um(self) -> np.ndarray:
-        """(P, 7 B) derivatives of the readings by each pattern, as of ``layout.term_weights``."""
-        weights = [term_weights(planar) for planar in self.model.patterns]
-        film = np.concatenate([film for film, _ in weights])
-        rows = block_diag(*(rows for _, rows in weights))
-        ends = [(self.predict_um(film + STEP * w), self.predict_um(film - STEP * w)) for w in rows]
-        return np.column_stack([(above - below) / (2.0 * STEP) for above, below in ends])
-
-
-class _Stages(NamedTuple):
-    """A model taken apart."""
-
-    arrival: DepositionModel  # with the effects that act before the film has arrived
-    finishing: tuple[Effect, ...]  # those that act on the film or the gauge
-    slope: bool  # whether one needs the film's slope
+def derivatives_by_pattern(
+    readings_of: OfWeights, patterns: Sequence[PlanarPattern]
+) -> np.ndarray:
+    """(P, 7 B) derivatives of the readings by each pattern, as of ``layout.term_weights`` [um]."""
+    weights = [term_weights(planar) for planar in patterns]
+    film = np.concatenate([film for film, _ in weights])
+    rows = block_diag(*(rows for _, rows in weights))
+    ends = [(readings_of(film + STEP * w), readings_of(film - STEP * w)) for w in rows]
+    return np.column_stack([(above - below) / (2.0 * STEP) for above, below in ends])
 
 
 class _Part:
     """One experiment, integrated at its points alone or with the stencils of the film's slope."""
 
-    def __init__(self, experiment: Experiment) -> None:
-        self.experiment = experiment
+    def __init__(self, experiment: Experiment, in_kernel: dict[str, Effect]) -> None:
+        self.experiment, self._in_kernel = experiment, in_kernel
         self._integrators: dict[bool, FilmIntegrator] = {}
         # Films and prepared paths depend on less than the model: many models share one.
         self._film_um = lru_cache(8)(self._integrated_um)
@@ -136,25 +103,42 @@ class _Part:
         """The P measured points, followed by the stencils where the slope is needed."""
         return self.experiment.points if slope else self.experiment.measured_points
 
-    def film_um(self, stages: _Stages) -> np.ndarray:
+    def film_um(self, model: DepositionModel) -> np.ndarray:
         """(F V,) what arrived at the points [um], one wet film after the other."""
-        return self._film_um(stages.arrival, stages.slope)
+        return self._film_um(*self._arriving(model))
 
-    def terms(self, stages: _Stages) -> np.ndarray:
+    def terms(self, model: DepositionModel) -> np.ndarray:
         """(7 B, F V) terms of these films."""
-        integrator, films = self._ready(stages.arrival, stages.slope)
-        count = len(self.points(stages.slope))
+        arriving, slope = self._arriving(model)
+        integrator, films = self._ready(arriving, slope)
+        count = len(self.points(slope))
         return np.hstack([integrator.terms(steps)[:, :count] for steps in films])
 
-    def gauge_reading_um(self, films_um: np.ndarray, stages: _Stages) -> np.ndarray:
+    def gauge_reading_um(self, films_um: np.ndarray, model: DepositionModel) -> np.ndarray:
         """(P,) gauge readings [um] of what arrived."""
-        points, films = self.points(stages.slope), self.experiment.films
+        films = self.experiment.films
+        points = self.points(any(effect.needs_slope for effect in model.effects))
         finished = (
-            (sign, after_effects('on_film', film_um, stages.finishing, points))
+            (sign, after_effects('on_film', film_um, model.effects, points))
             for (sign, _), film_um in zip(films, films_um.reshape(len(films), -1), strict=True)
         )
-        reading = after_effects('on_gauge', sum_um(finished), stages.finishing, points)
+        reading = after_effects('on_gauge', sum_um(finished), model.effects, points)
         return reading[: len(self.experiment)]
+
+    def _arriving(self, model: DepositionModel) -> tuple[DepositionModel, bool]:
+        """The model with what acts before the film has arrived, which must be integrated again.
+
+        Then whether one of its effects needs the film's slope.
+        """
+        early = ('on_path', 'widening', 'shadow', *LAWS)
+        before = [e for e in model.effects if e.acts(*early) and not e.is_neutral]
+        laws = {effect.id: effect for effect in before if effect.acts(*LAWS)}
+        if laws:
+            # All laws in a fixed order, absent ones neutral: one kernel, beside that without laws.
+            others = [effect for effect in before if effect.id not in laws]
+            before = [*others, *(self._in_kernel | laws).values()]
+        slope = any(effect.needs_slope for effect in model.effects)
+        return model.model_copy(update={'effects': tuple(before)}), slope
 
     def _integrated_um(self, model: DepositionModel, slope: bool) -> np.ndarray:
         integrator, films = self._ready(model, slope)

@@ -12,7 +12,8 @@ from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.fitting.forward import Forward, Terms
+from paint_deposition.film.layout import term_weights
+from paint_deposition.inference.fitting.forward import Forward, OfWeights, derivatives_by_pattern
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import COS, SIN
 from paint_deposition.kernel.eq2_flux import BY_COS, BY_SIN, CENTRED, EVEN, TERMS
@@ -184,29 +185,29 @@ def _best_starts(
         vector[shape] += 0.8 * width[shape] * away
         shaped = np.clip(vector, problem.low, problem.high)
         vector = problem.with_best_gains(shaped)
-        cost = np.sum(problem.residuals(vector, problem.terms(shaped)) ** 2)
+        cost = np.sum(problem.residuals(vector, problem.of_weights(shaped)) ** 2)
         tried.append((float(cost), vector))
     return [vector for _, vector in sorted(tried, key=lambda pair: pair[0])[:count]]
 
 
 def derivatives(
     forward: Forward, parameters: FreeParameters, vector: np.ndarray, sigma_um: np.ndarray,
-    terms: Terms | None = None,
+    readings_of: OfWeights | None = None,
 ) -> np.ndarray:  # fmt: skip
     """(P, k) derivative of the predictions by the vector, over the standard deviation.
 
-    Exact by the pattern; by effects it is the difference of two predictions. ``terms`` are those
-    of the vector, if they are known.
+    Exact by the pattern; by effects it is the difference of two predictions. ``readings_of`` is
+    that of the vector, if it is known.
     """
-    terms = terms or forward.terms(parameters.decode(vector))
-    count = len(parameters.pattern)
-    columns = [terms.derivatives_um() @ parameters.pattern.jacobian(vector[:count])]
+    model, count = parameters.decode(vector), len(parameters.pattern)
+    by_pattern = derivatives_by_pattern(readings_of or forward.of_weights(model), model.patterns)
+    columns = [by_pattern @ parameters.pattern.jacobian(vector[:count])]
     _, high = parameters.bounds
     for k in range(count, len(vector)):
         step = STEP if vector[k] + STEP <= high[k] else -STEP
         moved = vector.copy()
         moved[k] += step
-        change = forward.predict_um(parameters.decode(moved)) - forward.predict_um(terms.model)
+        change = forward.predict_um(parameters.decode(moved)) - forward.predict_um(model)
         columns.append(change[:, np.newaxis] / step)
     return np.hstack(columns) / sigma_um[:, np.newaxis]
 
@@ -225,7 +226,7 @@ class _Problem:
         self.lower = None if noise_alone else covariance_factor(nuisance, discrepancy)
         self.prior = parameters.prior
         self.low, self.high = parameters.bounds
-        self._last: tuple[bytes, Terms] | None = None
+        self._last: tuple[bytes, OfWeights] | None = None
         # Entries of the pattern's shape; its gains are found from anywhere.
         self.shape = [
             k for k, entry in enumerate(parameters.pattern.coordinates)
@@ -237,27 +238,28 @@ class _Problem:
         away = (one - other)[self.shape] / self.prior.width[self.shape]
         return bool(np.abs(away).max() > APART)
 
-    def terms(self, vector: np.ndarray) -> Terms:
+    def of_weights(self, vector: np.ndarray) -> OfWeights:
         key = vector.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = (key, self.forward.terms(self.parameters.decode(vector)))
+            self._last = (key, self.forward.of_weights(self.parameters.decode(vector)))
         return self._last[1]
 
-    def predict(self, vector: np.ndarray, terms: Terms | None = None) -> np.ndarray:
-        """(P,) readings [um]; ``terms`` are those of a vector that differs in gains only."""
-        terms = terms or self.terms(vector)
-        return terms.with_gains_um(self.parameters.decode(vector).patterns)
+    def predict(self, vector: np.ndarray, readings_of: OfWeights | None = None) -> np.ndarray:
+        """(P,) readings [um]; ``readings_of`` is that of a vector that differs in gains only."""
+        patterns = self.parameters.decode(vector).patterns
+        weights = np.concatenate([term_weights(planar)[0] for planar in patterns])
+        return (readings_of or self.of_weights(vector))(weights)
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
         return columns if self.lower is None else solve_triangular(self.lower, columns, lower=True)
 
-    def residuals(self, vector: np.ndarray, terms: Terms | None = None) -> np.ndarray:
-        misfit = self.whitened((self.predict(vector, terms) - self.measured) / self.sigma)
+    def residuals(self, vector: np.ndarray, readings_of: OfWeights | None = None) -> np.ndarray:
+        misfit = self.whitened((self.predict(vector, readings_of) - self.measured) / self.sigma)
         return np.concatenate([misfit, self.prior.whiten(vector)])
 
     def jacobian(self, vector: np.ndarray) -> np.ndarray:
-        terms = self.terms(vector)
-        slopes = derivatives(self.forward, self.parameters, vector, self.sigma, terms)
+        readings_of = self.of_weights(vector)
+        slopes = derivatives(self.forward, self.parameters, vector, self.sigma, readings_of)
         return np.vstack([self.whitened(slopes), self.prior.whitening])
 
     def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
@@ -281,7 +283,8 @@ class _Problem:
         one = np.eye(TERMS)[[EVEN, CENTRED, BY_COS, BY_SIN]]
         one[2:] += one[0]
         parts = np.kron(np.eye(pattern.count), one)
-        films = np.stack([self.terms(vector).predict_um(part) for part in parts]) / self.sigma
+        readings_of = self.of_weights(vector)
+        films = np.stack([readings_of(part) for part in parts]) / self.sigma
         films = films.reshape(pattern.count, len(one), -1)
         films[:, 2:] -= films[:, :1]
         # Weight of the prior that there is no asymmetry, as a share of what the ring leaves.

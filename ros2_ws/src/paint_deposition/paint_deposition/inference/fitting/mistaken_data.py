@@ -14,7 +14,6 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from scipy.special import logsumexp
 
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -114,8 +113,7 @@ class Weighed:
         # The model is linear around the fit, and its prior is not centred there.
         off = fit.residual + fit.jacobian @ (fit.vector - fit.parameters.prior.centre)
         misfit = replace(fitted_points(self.study, fit), residual_um=off * self.study.sigma_um)
-        weights = misfit.leave_one_out.log_weight
-        return float(logsumexp(weights)) - self.log_scale + self.log_size()
+        return misfit.log_likelihood - self.log_scale + self.log_size()
 
     @property
     def rough_log_weight(self) -> float:
@@ -287,7 +285,7 @@ def _mirrored(campaign: Campaign, some: Sequence[int]) -> Iterator[Meant]:
             centre_m = box_centre_m(surface.vertices_m)
             places_m = centre_m + (part.readings.positions_m - centre_m) @ mirror
             # A part that is not symmetric has them elsewhere along the line of sight.
-            off = surface.locate(places_m).distance_m > MAX_DISTANCE_M
+            off = surface.locate(places_m)[2] > MAX_DISTANCE_M
             before_m, hit = on_face_m(surface, from_edges_m(surface, places_m))
             places_m = np.where((off & hit)[:, np.newaxis], before_m, places_m)
             readings = replace(part.readings, positions_m=places_m, normals=None)

@@ -34,7 +34,7 @@ NEGLIGIBLE = 1e-3
 
 @dataclass(frozen=True)
 class FittedPoints:
-    """Readings beside a fitted model."""
+    """Readings beside a fitted model, and each of them as M models predict it from the others."""
 
     residual_um: np.ndarray  # (P,) measured minus predicted
     predicted_um: np.ndarray  # (P,)
@@ -45,8 +45,11 @@ class FittedPoints:
     covariates: Mapping[str, np.ndarray]  # (P,) each, by name
 
     @cached_property
-    def leave_one_out(self) -> 'LeaveOneOut':
-        """Leave-one-out predictions of the readings by all models."""
+    def leave_one_out(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """(M,) logarithm of prior share times likelihood, and (M,) texture of each model.
+
+        Then (M, P) residual that the other readings predict, and its standard deviation [um].
+        """
         log_prior = norm.logpdf(np.log(TEXTURES / USUAL_TEXTURE) / np.log(2.0))
         found, residual = [], self.residual_um
         for field, log_share in _fields(self):
@@ -60,7 +63,35 @@ class FittedPoints:
                 mean, sigma = residual - weighted / diagonal, diagonal**-0.5
                 found.append((likelihood + log_share + log_texture, texture, mean, sigma))
         log_weight, textures, mean, sigma = (np.array(of) for of in zip(*found, strict=True))
-        return LeaveOneOut(log_weight, textures, mean, sigma, residual)
+        return log_weight, textures, mean, sigma
+
+    @property
+    def log_likelihood(self) -> float:
+        """Logarithm of the likelihood of the readings, averaged over the models."""
+        return float(logsumexp(self.leave_one_out[0]))
+
+    @property
+    def texture_share(self) -> float:
+        """Posterior mean of the texture, as a share of the film."""
+        log_weight, texture, *_ = self.leave_one_out
+        return float(np.sum(np.exp(log_weight - self.log_likelihood) * texture))
+
+    @property
+    def log_density(self) -> np.ndarray:
+        """(P,) logarithm of the density that the other readings predict for each [1/um]."""
+        log_weight, _, expected_um, sigma_um = self.leave_one_out
+        own = norm.logpdf(self.residual_um, expected_um, sigma_um)
+        return self.log_likelihood - logsumexp(log_weight[:, np.newaxis] - own, axis=0)
+
+    def predicted_by_others(self, row: int) -> tuple[float, float]:
+        """Residual that the other readings predict for one, and its standard deviation [um]."""
+        log_weight, _, expected_um, sigma_um = self.leave_one_out
+        expected_um, sigma_um = expected_um[:, row], sigma_um[:, row]
+        log_weight = log_weight - norm.logpdf(self.residual_um[row], expected_um, sigma_um)
+        weight = np.exp(log_weight - logsumexp(log_weight))
+        mean = float(weight @ expected_um)
+        square = float(weight @ (sigma_um**2 + expected_um**2))
+        return mean, float(np.sqrt(square - mean**2))
 
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
@@ -68,38 +99,6 @@ class FittedPoints:
         arrays: dict[str, Any] = {name: getattr(self, name)[rows] for name in names}
         some = {name: values[rows] for name, values in self.covariates.items()}
         return replace(self, covariates=some, **arrays)
-
-
-@dataclass(frozen=True)
-class LeaveOneOut:
-    """Leave-one-out predictions of the readings by each of M models."""
-
-    log_weight: np.ndarray  # (M,) logarithm of prior share times likelihood
-    texture: np.ndarray  # (M,) of each model
-    expected_um: np.ndarray  # (M, P) residual that the other readings predict
-    sigma_um: np.ndarray  # (M, P) standard deviation of that prediction
-    residual_um: np.ndarray  # (P,)
-
-    @property
-    def texture_share(self) -> float:
-        """Posterior mean of the texture, as a share of the film."""
-        return float(np.sum(np.exp(self.log_weight - logsumexp(self.log_weight)) * self.texture))
-
-    @property
-    def log_density(self) -> np.ndarray:
-        """(P,) logarithm of the density that the other readings predict for each [1/um]."""
-        own = norm.logpdf(self.residual_um, self.expected_um, self.sigma_um)
-        others = self.log_weight[:, np.newaxis] - own
-        return logsumexp(self.log_weight) - logsumexp(others, axis=0)
-
-    def predicted(self, row: int) -> tuple[float, float]:
-        """Residual that the other readings predict for one, and its standard deviation [um]."""
-        own = norm.logpdf(self.residual_um[row], self.expected_um[:, row], self.sigma_um[:, row])
-        log_weight = self.log_weight - own
-        weight = np.exp(log_weight - logsumexp(log_weight))
-        mean = float(weight @ self.expected_um[:, row])
-        square = float(weight @ (self.sigma_um[:, row] ** 2 + self.expected_um[:, row] ** 2))
-        return mean, float(np.sqrt(square - mean**2))
 
 
 def _solved(variance: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, float]:
@@ -200,18 +199,17 @@ def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, Expecte
     film, left = np.mean(misfit.predicted_um), misfit
     prior = np.log(PRIOR_PROBABILITY / (1.0 - PRIOR_PROBABILITY))
     while True:
-        leave_one_out = left.leave_one_out
         # Nothing is known of an outlier but that it is a number of the size of the film.
         wild = -np.log(np.pi * film * (1.0 + (left.residual_um / film) ** 2))  # Cauchy's.
         wild = np.where(single[kept], prior + wild, -np.inf)
-        log_odds = wild - leave_one_out.log_density
+        log_odds = wild - left.log_density
         worst = int(np.argmax(log_odds))
         out: dict[int, Expected] = {
             row: (*expected, int(kept[other]))
             for row, (expected, other) in _swapped(left, wild, log_odds).items()
         }
         if not out and expit(log_odds[worst]) >= LEAST_PROBABILITY:
-            out = {worst: (*leave_one_out.predicted(worst), None)}
+            out = {worst: (*left.predicted_by_others(worst), None)}
         if not out:
             return found
         # A greater share of outliers means that the model is at fault.
@@ -232,7 +230,7 @@ def _swapped(
         log_odds: (P,) that each is one.
 
     Returns:
-        Of each what the others predict, as ``LeaveOneOut.predicted``, and the other row.
+        Of each what the others predict, as ``predicted_by_others``, and the other row.
     """
     gain, i, j = _best_swap(misfit)
     if gain < 8.0:
@@ -241,17 +239,16 @@ def _swapped(
     more_um = misfit.predicted_um[j] + residual_um[j] - misfit.predicted_um[i] - residual_um[i]
     residual_um[[i, j]] += more_um, -more_um
     swapped = replace(misfit, residual_um=residual_um)
-    after = swapped.leave_one_out
-    found = {i: (after.predicted(i), j), j: (after.predicted(j), i)}
+    found = {i: (swapped.predicted_by_others(i), j), j: (swapped.predicted_by_others(j), i)}
     for row, ((mean, sigma), _) in found.items():
         if abs(swapped.residual_um[row] - mean) > GUESS_SIGMAS * sigma:
             return {}
     pairs = 0.5 * len(wild) * (len(wild) - 1)
-    likelihood = logsumexp(misfit.leave_one_out.log_weight)
-    others = misfit.select(np.delete(np.arange(len(wild)), [i, j])).leave_one_out.log_weight
-    both_out = wild[i] + wild[j] + np.log(2.0 * np.pi) + logsumexp(others) - likelihood
+    likelihood = misfit.log_likelihood
+    others = misfit.select(np.delete(np.arange(len(wild)), [i, j])).log_likelihood
+    both_out = wild[i] + wild[j] + np.log(2.0 * np.pi) + others - likelihood
     # Prior probability that two readings of a campaign are swapped.
-    as_swapped = np.log(0.02 / pairs) + logsumexp(after.log_weight) - likelihood
+    as_swapped = np.log(0.02 / pairs) + swapped.log_likelihood - likelihood
     slips = log_odds[i], log_odds[j], both_out
     # Whatever is wrong with the two, both are left out; what is most probable is said.
     sure = expit(logsumexp([as_swapped, *slips])) >= LEAST_PROBABILITY

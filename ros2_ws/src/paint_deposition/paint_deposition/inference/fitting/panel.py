@@ -5,7 +5,7 @@ little more film along a panel's rim, as fat edges have it, then makes the fitte
 wide, which its intervals do not show.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -22,7 +22,7 @@ from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.plausibility import FEWEST_POINTS
-from paint_deposition.inference.readings.readings import Readings, Residuals
+from paint_deposition.inference.readings.readings import Readings, root_mean_square
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.motion.trajectory import ONLY_BRUSH
@@ -95,6 +95,22 @@ class Panel:
         away = self.across_m[:, np.newaxis] - self.passes_m
         return np.where(self.mirrored, -away, away)
 
+    def film_um(self, collapse: ThreeGaussianCollapse) -> np.ndarray:
+        """(P,) film of all passes at the points, eq. (3) being that of the first one [um]."""
+        faster = self.speed_m_per_s[0] / self.speed_m_per_s
+        return (collapse.thickness_um(self.places_m) * faster).sum(axis=1)
+
+    def figures(self, collapse: ThreeGaussianCollapse, measured_um: np.ndarray) -> dict[str, Any]:
+        """Eq. (3), and eq. (5) for it at the panel's own index if it has one, beside (P,) [um]."""
+        index = self.scale_m if len(self.passes_m) > 1 else None
+        return {
+            **collapse.model_dump(),
+            'index_m': index,
+            'sigma_n': index and ParallelPasses.one_way(collapse).sigma_n(index),
+            'rmse_um': root_mean_square(measured_um - self.film_um(collapse)),
+            'speed_m_per_s': float(self.speed_m_per_s[0]),
+        }
+
 
 def check_panel(
     readings: Readings, panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray
@@ -127,28 +143,10 @@ def check_panel(
         )
 
 
-@dataclass(frozen=True)
-class PanelFit:
-    """The one-dimensional fit of a panel."""
-
-    panel: Panel  # where its points lie
-    collapse: ThreeGaussianCollapse  # eq. (3) for the first pass's speed
-    residuals: Residuals  # of the P points, with the film of all passes as the prediction
-
-    def to_dict(self) -> dict[str, Any]:
-        """Eq. (3), and eq. (5) for it at the panel's own index if it has one."""
-        index = self.panel.scale_m if len(self.panel.passes_m) > 1 else None
-        return {
-            **self.collapse.model_dump(),
-            'index_m': index,
-            'sigma_n': index and ParallelPasses.one_way(self.collapse).sigma_n(index),
-            'rmse_um': self.residuals.rmse_um,
-            'speed_m_per_s': float(self.panel.speed_m_per_s[0]),
-        }
-
-
-def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) -> PanelFit:
-    """Fit eq. (3), summed over the passes, with a loss that is robust against gross errors.
+def fit_collapse(
+    panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray
+) -> ThreeGaussianCollapse:
+    """Fit eq. (3) of the first pass, summed over all, by a loss that forgives gross errors.
 
     Args:
         panel: where points and passes lie.
@@ -181,70 +179,62 @@ def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) ->
     best = min(found, key=lambda result: result.cost).x
     gain = best[:3] * area * scale
     sigma = np.exp(best[5:]) * scale
-    collapse = ThreeGaussianCollapse(
+    return ThreeGaussianCollapse(
         K1_um_m=gain[0], K2_um_m=gain[1], K3_um_m=gain[2],
         r1_m=best[3] * scale, r2_m=best[4] * scale,
         sigma1_m=sigma[0], sigma2_m=sigma[1], sigma3_m=sigma[2],
     )  # fmt: skip
-    return PanelFit(panel, collapse, Residuals(measured_um, film(best), sigma_um))
 
 
 # Readings reach an edge of the pattern beyond which no more of a pass's paint lands than this.
 PAINT_BEYOND = 0.025
+# Of a pass the distances of the outermost readings on either side [m], the shares of its paint
+# that land further out, and the distance at which both sides would be reached [m].
+Reach = tuple[tuple[float, float], tuple[float, float], float]
 
 
-@dataclass(frozen=True)
-class FootprintCoverage:
-    """How far the readings of a panel reach to both sides of the pass that they cover best."""
-
-    experiment: int  # its number
-    name: str  # its name
-    across_m: np.ndarray  # (P,) coordinate of its points across the passes [m]
-    ends_m: tuple[float, float]  # distance of the outermost reading on either side [m]
-    beyond: tuple[float, float]  # share of the pass's paint that lands further out on either side
-    needed_m: float  # distance at which both sides would be reached [m]
-
-    def __str__(self) -> str:
-        return (
-            f'{self.name}: the readings end {self.ends_m[0]:.2f} and {self.ends_m[1]:.2f} m to '
-            f'the sides of a pass, where {100 * self.beyond[0]:.0f} and '
-            f'{100 * self.beyond[1]:.0f} % of its paint lands further out: the edges of the '
-            'pattern are extrapolated; measure, on a larger panel if need be, '
-            f'about {self.needed_m:.1f} m to both sides of a pass'
-        )
-
-
-def short_reaches(campaign: Campaign, model: DepositionModel) -> tuple[FootprintCoverage, ...]:
+def short_reaches(campaign: Campaign, model: DepositionModel) -> dict[int, str]:
     """The panels of a campaign on which no pass was measured to both edges of its pattern.
 
-    Of a brush there are none if one of its panels shows both edges, or where no part is a flat
-    panel.
+    By the number of their experiment, a sentence each. Of a brush there are none if one of its
+    panels shows both edges, or where no part is a flat panel.
     """
-    by_brush: dict[int, list[FootprintCoverage]] = {}
+    by_brush: dict[int, dict[int, Reach]] = {}
     for k, one in enumerate(campaign.experiments):
         if panel := Panel.of(one):
-            reach = _coverage(k, one.name, panel, model.painting_with(panel.brush))
-            by_brush.setdefault(panel.brush, []).append(reach)
-    short = (f for f in by_brush.values() if min(max(r.beyond) for r in f) > PAINT_BEYOND)
-    return tuple(reach for found in short for reach in found)
+            reach = reach_of(panel, model.painting_with(panel.brush))
+            by_brush.setdefault(panel.brush, {})[k] = reach
+    found: dict[int, str] = {}
+    for reaches in by_brush.values():
+        if min(max(beyond) for _, beyond, _ in reaches.values()) > PAINT_BEYOND:
+            for k, (ends_m, beyond, needed_m) in reaches.items():
+                found[k] = (
+                    f'{campaign.experiments[k].name}: the readings end {ends_m[0]:.2f} and '
+                    f'{ends_m[1]:.2f} m to the sides of a pass, where {100 * beyond[0]:.0f} and '
+                    f'{100 * beyond[1]:.0f} % of its paint lands further out: the edges of the '
+                    'pattern are extrapolated; measure, on a larger panel if need be, '
+                    f'about {needed_m:.1f} m to both sides of a pass'
+                )
+    return found
 
 
 def shifts(
-    study: Study, fit: Fit, reaches: tuple[FootprintCoverage, ...], fitted: Callable[[Study], Fit]
+    study: Study, fit: Fit, short: Iterable[int], fitted: Callable[[Study], Fit]
 ) -> np.ndarray:
     """(n, k) by how much the fit's vector moves without the readings at the ends.
 
     Args:
-        reaches: panels whose ends are left out, strip by strip.
+        short: numbers of the panels whose ends are left out, strip by strip.
     """
-    moved = []
+    experiments, moved = study.campaign.experiments, []
+    panels = {k: panel for k in short if (panel := Panel.of(experiments[k]))}
     # Width of the strips at the ends [m].
     for strip_m in (0.05, 0.1):
         inside = np.ones(len(study), dtype=bool)
-        for reach in reaches:
-            low, high = reach.across_m.min() + strip_m, reach.across_m.max() - strip_m
-            here = study.campaign.experiment_of == reach.experiment
-            inside[here] = (reach.across_m >= low) & (reach.across_m <= high)
+        for number, panel in panels.items():
+            low, high = panel.across_m.min() + strip_m, panel.across_m.max() - strip_m
+            here = study.campaign.experiment_of == number
+            inside[here] = (panel.across_m >= low) & (panel.across_m <= high)
         if FEWEST_POINTS <= inside.sum() < len(inside):
             try:
                 moved.append(fitted(study.of_points(inside)).vector - fit.vector)
@@ -253,8 +243,9 @@ def shifts(
     return np.array(moved).reshape(len(moved), len(fit.vector))
 
 
-def _coverage(number: int, name: str, panel: Panel, model: DepositionModel) -> FootprintCoverage:
-    reaches = []
+def reach_of(panel: Panel, model: DepositionModel) -> Reach:
+    """How far the readings of a panel reach to both sides of the pass that they cover best."""
+    reaches: list[Reach] = []
     low, high = panel.across_m.min(), panel.across_m.max()
     passes = zip(panel.passes_m, panel.speed_m_per_s, panel.mirrored, strict=True)
     for line, speed, mirrored in passes:
@@ -268,5 +259,5 @@ def _coverage(number: int, name: str, panel: Panel, model: DepositionModel) -> F
         ends = np.interp([PAINT_BEYOND, 1.0 - PAINT_BEYOND], landed, x)
         to_ends = float(line - low), float(high - line)
         needed_m = float(np.abs(ends).max())
-        reaches.append(FootprintCoverage(number, name, panel.across_m, to_ends, beyond, needed_m))
-    return min(reaches, key=lambda reach: max(reach.beyond))
+        reaches.append((to_ends, beyond, needed_m))
+    return min(reaches, key=lambda reach: max(reach[1]))

@@ -79,12 +79,13 @@ def random_effects(
         'part level', '%', names, 100.0 * mixing,
         part_of @ mixing * (measured_um / sigma_um)[:, np.newaxis],
     )  # fmt: skip
-    means, labels = campaign.means, campaign.readings.session
-    sessions = tuple(dict.fromkeys(labels.tolist()))
+    readings = campaign.readings
+    sessions = tuple(dict.fromkeys(readings.session.tolist()))
     # Repeats at one point may belong to several sessions.
-    shares = np.column_stack(
-        [np.bincount(means.owner, labels == session) / means.repeats for session in sessions]
-    )
+    shares = np.column_stack([
+        np.bincount(readings.owner, readings.session == session) / readings.repeats
+        for session in sessions
+    ])  # fmt: skip
     zeros = SESSION_UM * _contrasts(shares[used].any(axis=0))
     zero = RandomEffects(
         'gauge zero', 'µm', sessions, zeros, shares @ zeros / sigma_um[:, np.newaxis]

@@ -77,7 +77,7 @@ class Study:
     @property
     def measured_um(self) -> np.ndarray:
         """(P,) means over repeats [um]."""
-        return self.campaign.means.mean_um
+        return self.campaign.readings.mean_um
 
     @cached_property
     def sigma_um(self) -> np.ndarray:
@@ -109,7 +109,7 @@ class Study:
         Raises:
             ReadingsError: an experiment has no reading left.
         """
-        left_out = ~kept[self.campaign.means.owner]
+        left_out = ~kept[self.campaign.readings.owner]
         campaign = self.campaign.without(left_out)
         forward = Forward(campaign, self.forward.effects)
         facet_um = None if self.facet_um is None else self.facet_um[kept]
@@ -121,8 +121,8 @@ class Study:
     @property
     def gauge_um(self) -> np.ndarray:
         """(P,) standard deviation of the points from the gauge alone, without texture [um]."""
-        means = self.campaign.means
-        return np.sqrt(np.bincount(means.owner, self.noise.sigma_um**2)) / means.repeats
+        readings = self.campaign.readings
+        return np.sqrt(np.bincount(readings.owner, self.noise.sigma_um**2)) / readings.repeats
 
     def __len__(self) -> int:
         return len(self.measured_um)

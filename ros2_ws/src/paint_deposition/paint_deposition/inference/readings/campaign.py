@@ -15,9 +15,9 @@ from paint_deposition.inference.readings.places import (
     refuse_off_surface,
     refuse_other_side,
 )
-from paint_deposition.inference.readings.readings import PointMeans, Readings
+from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.points import SurfacePoints, angles_rad
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import Zones
 
@@ -32,8 +32,7 @@ class Experiment:
     name: str  # for reports
     surface: Surface  # the refined part
     path: SprayPath  # sub-steps of the recorded motion
-    readings: Readings  # those that are used
-    means: PointMeans  # the readings averaged over repeats; its P points are what is fitted
+    readings: Readings  # those that are used; the means of their P points are what is fitted
     # The P measured points on the surface, followed by the stencils around them from which the
     # film's slope is taken.
     points: SurfacePoints
@@ -69,30 +68,30 @@ class Experiment:
                 'nothing says which motion laid which; name the coats (coats: in a campaign, '
                 '--coat with simulate), or the one column to read (columns: {thickness: ...})'
             )
-        means = PointMeans.of(readings)
-        normals = None if readings.normals is None else readings.normals[means.first]
-        positions = readings.positions_m[means.first]
-        place = surface.locate(positions, normals)
-        refuse_off_surface(surface, readings, means, place.distance_m)
+        first, owner = readings.first, readings.owner
+        normals = None if readings.normals is None else readings.normals[first]
+        positions = readings.positions_m[first]
+        places_m, outward, distance_m = surface.locate(positions, normals)
+        refuse_off_surface(surface, readings, distance_m)
         if normals is not None:
-            refuse_other_side(readings, means, place.angle_rad)
+            refuse_other_side(readings, angles_rad(outward, normals))
         points = surface.at(positions, normals, stencil_m=STENCIL_M)
         if not readings.group.astype(bool).any():
-            lines = columns_or_rows(surface, path, place.positions_m)
-            readings = replace(readings, group=lines[means.owner])
+            lines = columns_or_rows(surface, path, places_m)
+            readings = replace(readings, group=lines[owner])
         used = np.ones(len(readings), dtype=bool)
-        return Experiment(name, surface, path, readings, means, points, readings, used, **known)
+        return Experiment(name, surface, path, readings, points, readings, used, **known)
 
     def with_readings(self, readings: Readings) -> 'Experiment':
         """The part with other readings; raises what ``of`` does."""
         found = Experiment.of(self.name, self.surface, self.path, readings)
-        matched = ('readings', 'means', 'points', 'taken', 'used')
+        matched = ('readings', 'points', 'taken', 'used')
         return replace(self, **{name: getattr(found, name) for name in matched})
 
     def read_as(self, readings: Readings) -> 'Experiment':
         """The part with other films read at the same points; nothing is matched anew."""
-        means, used = PointMeans.of(readings), np.ones(len(readings), dtype=bool)
-        return replace(self, readings=readings, means=means, taken=readings, used=used)
+        used = np.ones(len(readings), dtype=bool)
+        return replace(self, readings=readings, taken=readings, used=used)
 
     def without(self, left_out: np.ndarray) -> 'Experiment':
         """The part without some of the readings (N,) that were used.
@@ -112,7 +111,7 @@ class Experiment:
         return replace(self.with_readings(self.taken.select(used)), taken=self.taken, used=used)
 
     def __len__(self) -> int:
-        return len(self.means.mean_um)
+        return len(self.readings.first)
 
     @cached_property
     def brushes(self) -> frozenset[int]:
@@ -127,7 +126,7 @@ class Experiment:
     @cached_property
     def off_surface_m(self) -> np.ndarray:
         """(P,) how far each point was moved onto the surface [m]."""
-        taken = self.readings.positions_m[self.means.first]
+        taken = self.readings.positions_m[self.readings.first]
         return np.linalg.norm(taken - self.measured_points.positions_m, axis=1)
 
     @property
@@ -146,7 +145,7 @@ class Experiment:
     @property
     def groups(self) -> np.ndarray:
         """(P,) group label of each point."""
-        return self.readings.group[self.means.first]
+        return self.readings.group[self.readings.first]
 
 
 @dataclass(frozen=True)
@@ -187,17 +186,12 @@ class Campaign:
             raise ReadingsError(f"two experiments are called '{twice[0]}'; rename one")
 
     def __len__(self) -> int:
-        return len(self.means.mean_um)
+        return len(self.readings.first)
 
     @cached_property
     def readings(self) -> Readings:
         """The N readings that are used; the label of a point names its experiment."""
         return Readings.joined({e.name: e.readings for e in self.experiments})
-
-    @cached_property
-    def means(self) -> PointMeans:
-        """The readings averaged over repeats, P points."""
-        return PointMeans.of(self.readings)
 
     @cached_property
     def experiment_of(self) -> np.ndarray:
@@ -232,7 +226,7 @@ class Campaign:
         Raises:
             ReadingsError: an experiment has no reading left.
         """
-        owner = self.experiment_of[self.means.owner]
+        owner = self.experiment_of[self.readings.owner]
         kept = (e.without(left_out[owner == k]) for k, e in enumerate(self.experiments))
         return replace(self, experiments=tuple(kept))
 

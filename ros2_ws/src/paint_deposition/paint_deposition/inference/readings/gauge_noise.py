@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import median
 from scipy.special import ndtri, stdtrit
 
-from paint_deposition.inference.readings.readings import PointMeans, Readings, root_mean_square
+from paint_deposition.inference.readings.readings import Readings, root_mean_square
 
 # Fewer degrees of freedom from repeats than this are not trusted alone.
 ENOUGH_REPEATS = 6
@@ -61,7 +61,7 @@ def left_out_lines(taken: Readings, used: np.ndarray) -> list[str]:
 
 def _gross(readings: Readings) -> np.ndarray:
     """(N,) outliers of one gauge, from a robust scale and iterated until the set stays."""
-    owner = PointMeans.of(readings).owner
+    owner = readings.owner
     count = np.bincount(owner)
     middle = median(readings.thickness_um, owner, np.arange(len(count)))[owner]
     scaled = (readings.thickness_um - middle) / np.fmax(usual_noise_um(middle), readings.sigma_um)
@@ -134,10 +134,9 @@ def gauge_noise(readings: Readings) -> GaugeNoise:
         return GaugeNoise(stated, 'stated', np.inf, gross)
     usual = usual_noise_um(readings.thickness_um)
     counted = readings.select(np.isnan(stated) & ~gross)
-    means = PointMeans.of(counted)
-    film = means.mean_um[means.owner]
+    film = counted.mean_um[counted.owner]
     squares = float(np.sum(((counted.thickness_um - film) / usual_noise_um(film)) ** 2))
-    freedom = len(counted) - len(means.first)
+    freedom = len(counted) - len(counted.first)
     known = freedom >= ENOUGH_REPEATS and squares > 0.0
     scaled = usual * np.sqrt(squares / freedom) if known else usual
     sigma = np.where(np.isfinite(stated), stated, scaled)

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.inference.readings.readings import PointMeans, Readings
+from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import near_pairs
 from paint_deposition.part.points import across_axis, box_words, downhill_axis
@@ -21,18 +21,17 @@ OTHER_UNITS = {
 NEAR_M = 0.02
 
 
-def refuse_off_surface(
-    surface: Surface, readings: Readings, means: PointMeans, distance_m: np.ndarray
-) -> None:
+def refuse_off_surface(surface: Surface, readings: Readings, distance_m: np.ndarray) -> None:
     """Refuse points (P,) that are this far from the surface [m]."""
     places_m = readings.positions_m
     far = np.count_nonzero(distance_m > MAX_DISTANCE_M)
     if far:
         worst = int(np.argmax(distance_m))
-        where = ', '.join(f'{value:.3f}' for value in places_m[means.first[worst]])
+        row = readings.first[worst]
+        where = ', '.join(f'{value:.3f}' for value in places_m[row])
         raise ReadingsError(
             f"{readings.source}: {far} of {len(distance_m)} points lie off the part's surface, "
-            f"point '{readings.point[means.first[worst]]}' at ({where}) m by "
+            f"point '{readings.point[row]}' at ({where}) m by "
             f'{distance_m[worst]:.3f} m (limit {MAX_DISTANCE_M:g}); {_hint(surface, places_m)}'
         )
     # Readings clustered on a spot of the part are metres taken for mm, if they fit so.
@@ -54,7 +53,7 @@ def unit_in_doubt(surface: Surface, readings: Readings) -> str:
     units = [
         unit
         for factor, unit in {10.0: 'cm', 25.4: 'inch'}.items()
-        if surface.locate(factor * places_m).distance_m.max() < MAX_DISTANCE_M
+        if surface.locate(factor * places_m)[2].max() < MAX_DISTANCE_M
     ]
     if not units:
         return ''
@@ -66,14 +65,14 @@ def unit_in_doubt(surface: Surface, readings: Readings) -> str:
     )
 
 
-def refuse_other_side(readings: Readings, means: PointMeans, angle_rad: np.ndarray) -> None:
+def refuse_other_side(readings: Readings, angle_rad: np.ndarray) -> None:
     """Refuse points whose normals (P,) are turned this far from the surface's [rad]."""
     away = np.count_nonzero(angle_rad > np.radians(60.0))
     if away:
         worst = int(np.argmax(angle_rad))
         raise ReadingsError(
             f'{readings.source}: {away} of {len(angle_rad)} normals point away from the '
-            f"surface, point '{readings.point[means.first[worst]]}' by "
+            f"surface, point '{readings.point[readings.first[worst]]}' by "
             f'{np.degrees(angle_rad[worst]):.0f} deg; give outward normals'
         )
 
@@ -85,8 +84,8 @@ def _hint(surface: Surface, positions_m: np.ndarray) -> str:
     for factor, words in OTHER_UNITS.items():
         if _fits(surface, factor * positions_m):
             return f'{boxes}; {words}'
-    distance = surface.locate(positions_m).distance_m
-    if np.median(distance) < NEAR_M:
+    *_, distance_m = surface.locate(positions_m)
+    if np.median(distance_m) < NEAR_M:
         return f'{boxes}; most points lie on the part: check these'
     sides, part = (np.sort(np.ptp(each, axis=0)) for each in (positions_m, vertices))
     # Boxes whose sides agree this well are the same part at another place.
@@ -101,7 +100,8 @@ def _fits(surface: Surface, positions_m: np.ndarray) -> bool:
     # Readings span at least this share of the part's longest side, or a spot of it was measured.
     if span < 0.1 * np.ptp(surface.vertices_m, axis=0).max():
         return False
-    return bool(np.median(surface.locate(positions_m).distance_m) < NEAR_M)
+    *_, distance_m = surface.locate(positions_m)
+    return bool(np.median(distance_m) < NEAR_M)
 
 
 FEWEST_ON_A_LINE = 3

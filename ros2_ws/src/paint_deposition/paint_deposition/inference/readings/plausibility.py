@@ -150,7 +150,7 @@ def targets_in_doubt(experiment: Experiment, target_um: float) -> Iterator[str]:
     Args:
         target_um: of the film outside of zones; 0 is none.
     """
-    film, found = experiment.means.mean_um, experiment.zones_of_points
+    film, found = experiment.readings.mean_um, experiment.zones_of_points
     number = np.full(len(film), NONE) if found is None else found.number
     wanted = [('the target', target_um, NONE)] if target_um else []
     zones = found.zones if found else ()
@@ -192,7 +192,7 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]
         painted = FilmIntegrator(one.measured_points, plain, 'double', parallel=False)
         painted.add(one.path)
         if painted.raw_um.max() >= NO_PAINT_UM:
-            expected_um = painted.raw_um[one.means.owner]
+            expected_um = painted.raw_um[one.readings.owner]
             target_um, _ = campaign.target_of(one)
             odd = [
                 *targets_in_doubt(one, target_um),

@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Mapping, Sized
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -94,33 +95,32 @@ class Readings:
         some: dict[str, Any] = {n: c if c is None else c[rows] for n, c in columns.items()}
         return replace(self, **some)
 
+    @cached_property
+    def owner(self) -> np.ndarray:
+        """(N,) point of each reading, one of P; they are in order of first appearance."""
+        _, first, owner = np.unique(self.point, return_index=True, return_inverse=True)
+        return np.argsort(np.argsort(first))[owner]
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """(P,) row of each point's first reading."""
+        return np.unique(self.owner, return_index=True)[1]
+
+    @cached_property
+    def repeats(self) -> np.ndarray:
+        """(P,) number of readings at each point."""
+        return np.bincount(self.owner)
+
+    @cached_property
+    def mean_um(self) -> np.ndarray:
+        """(P,) readings averaged over their repeats [um]."""
+        return np.bincount(self.owner, self.thickness_um) / self.repeats
+
     @property
     def fingerprint(self) -> str:
         """Twelve hexadecimal digits that identify these readings."""
         table = np.column_stack([self.positions_m, self.thickness_um])
         return hashlib.sha256(np.ascontiguousarray(table).tobytes()).hexdigest()[:12]
-
-
-@dataclass(frozen=True)
-class PointMeans:
-    """Readings averaged over their repeats: one row a point, in order of first appearance."""
-
-    first: np.ndarray  # (P,) row of the point's first reading
-    repeats: np.ndarray  # (P,) number of readings
-    mean_um: np.ndarray  # (P,) [um]
-    owner: np.ndarray  # (N,) point of each reading
-
-    @staticmethod
-    def of(readings: Readings) -> 'PointMeans':
-        """Average readings that share a point."""
-        _, first, owner = np.unique(readings.point, return_index=True, return_inverse=True)
-        order = np.argsort(first)
-        rank = np.empty_like(order)
-        rank[order] = np.arange(len(order))
-        owner = rank[owner]
-        repeats = np.bincount(owner)
-        mean = np.bincount(owner, readings.thickness_um) / repeats
-        return PointMeans(first[order], repeats, mean, owner)
 
 
 def require_repeats_close(readings: Readings) -> None:
@@ -129,10 +129,8 @@ def require_repeats_close(readings: Readings) -> None:
     Raises:
         ReadingsError: naming the label and the distance.
     """
-    means = PointMeans.of(readings)
-    apart = np.linalg.norm(
-        readings.positions_m - readings.positions_m[means.first][means.owner], axis=1
-    )
+    first = readings.first[readings.owner]
+    apart = np.linalg.norm(readings.positions_m - readings.positions_m[first], axis=1)
     worst = int(np.argmax(apart)) if len(apart) else 0
     # Repeats further apart were not taken at one point [m].
     if len(apart) and apart[worst] > 0.03:

@@ -98,38 +98,45 @@ def field_message(surface: Surface, film_um: np.ndarray, at: Header) -> Thicknes
     return ThicknessField(header=at, mesh_id=surface.mesh_id, thickness_um=thickness_um)
 
 
-class LargeTopic:
-    """Publishes large messages, only when a subscriber lacks the newest version.
+def large_publisher(
+    node: Node, message: type, topic: str, profile: QoSProfile
+) -> Callable[[int, Callable[[], Any]], None]:
+    """Make what publishes large messages, only when a subscriber lacks the newest version.
 
-    The next message waits until all reliable subscribers have acknowledged the last one, so that
-    a slow link gets fewer messages instead of a queue. It also waits as long as needed to keep
-    the work within a fifth of a core.
+    It is called again and again, with the version and what makes its message. The next message
+    waits until all reliable subscribers have acknowledged the last one, so that a slow link gets
+    fewer messages instead of a queue. It also waits as long as needed to keep the work within a
+    fifth of a core.
     """
+    # The event of the last subscriber that came or left.
+    matched: Any = SimpleNamespace(current_count=0, total_count=0)
+    # The last version sent, and the total number of subscribers by then.
+    sent: tuple[int, int] | None = None
+    sent_s = next_allowed_s = 0.0
 
-    def __init__(self, node: Node, message: type, topic: str, profile: QoSProfile) -> None:
-        # The event of the last subscriber that came or left.
-        self._matched: Any = SimpleNamespace(current_count=0, total_count=0)
-        matched = PublisherEventCallbacks(matched=partial(setattr, self, '_matched'))
-        self._publisher: Publisher = node.create_publisher(
-            message, topic, profile, event_callbacks=matched
-        )
-        # The last version sent, and the total number of subscribers by then.
-        self._sent: tuple[int, int] | None = None
-        self._sent_s = self._next_allowed_s = 0.0
+    def take(event: Any) -> None:
+        nonlocal matched
+        matched = event
 
-    def publish_if_wanted(self, version: int, make: Callable[[], Any]) -> None:
-        """Publish a version if a subscriber lacks it and the link is free; else call it again."""
+    publisher: Publisher = node.create_publisher(
+        message, topic, profile, event_callbacks=PublisherEventCallbacks(matched=take)
+    )
+
+    def publish_if_wanted(version: int, make: Callable[[], Any]) -> None:
+        nonlocal sent, sent_s, next_allowed_s
         # Not the publisher's own count, which grows before the event of a new subscriber.
-        matched, began_s = self._matched, time.monotonic()
-        wanted = version, matched.total_count
-        if not matched.current_count or wanted == self._sent or began_s < self._next_allowed_s:
+        subscribers, began_s = matched, time.monotonic()
+        wanted = version, subscribers.total_count
+        if not subscribers.current_count or wanted == sent or began_s < next_allowed_s:
             return
-        acknowledged = self._publisher.wait_for_all_acked(Duration(nanoseconds=0))
-        if not acknowledged and began_s < self._sent_s + ACKNOWLEDGE_TIMEOUT_S:
+        acknowledged = publisher.wait_for_all_acked(Duration(nanoseconds=0))
+        if not acknowledged and began_s < sent_s + ACKNOWLEDGE_TIMEOUT_S:
             return
-        self._publisher.publish(make())
-        self._sent, self._sent_s = wanted, time.monotonic()
-        self._next_allowed_s = began_s + 5.0 * (self._sent_s - began_s)
+        publisher.publish(make())
+        sent, sent_s = wanted, time.monotonic()
+        next_allowed_s = began_s + 5.0 * (sent_s - began_s)
+
+    return publish_if_wanted
 
 
 class FilmDisplay:
@@ -147,7 +154,7 @@ class FilmDisplay:
         self._legend = node.create_publisher(MarkerArray, 'thickness/legend', topics.LATCHED)
         self._figures = node.create_publisher(ThicknessStats, 'thickness/stats', topics.LATCHED)
         self._large = {
-            topic: LargeTopic(node, message, topic, profile)
+            topic: large_publisher(node, message, topic, profile)
             for topic, message, profile in (
                 ('thickness/mesh', Marker, topics.LATCHED),
                 ('thickness/cloud', PointCloud2, topics.RESULTS),
@@ -223,7 +230,7 @@ class FilmDisplay:
         for gun, topic in enumerate(self._share_topics):
             make[topic] = partial(lambda k: field_message(surface, film.shares_um[k], at), gun)
         for topic, message in make.items():
-            self._large[topic].publish_if_wanted(self._version, message)
+            self._large[topic](self._version, message)
         # The statistics are published when a count has changed, too.
         node, message = self._node, self._stats
         refused = sum(source.refused_frames.total() for source in node.inputs)
