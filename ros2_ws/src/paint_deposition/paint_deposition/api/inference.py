@@ -79,8 +79,12 @@ def compare(
     study, fit = clean_and_fit(campaign, start, start.effects, STARTS if model else 10)
     progress('comparing')
     short = short_reaches(study.campaign, fit.model) if model is None else {}
+    found = compared(study, model or fit.model)
     warnings = (*study.warnings, *doubts, *short.values())
-    return replace(compared(study, model or fit.model), warnings=warnings)
+    if not warnings:
+        levels = study.level_doubt(study.forward.predict_um(found.model))
+        warnings = tuple(filter(None, [levels]))
+    return replace(found, warnings=warnings)
 
 
 def compare_models(

@@ -75,6 +75,7 @@ def separation_words(spray: Spray) -> str:
     )
     if spray.chance == spray.chance:
         words += f', and one effect is left with a probability of {percent(spray.chance)}'
+        words += ': it hardly helps' if spray.chance < 0.05 else ''
     return '; '.join(filter(None, [words, spray.film_words]))
 
 

@@ -115,8 +115,13 @@ def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) 
         return state.diagnosis(p_value, 'unknown_effect', reason, (), unknown)
     reason = f'{beyond}: sprays of one setting usually differ by as much.'
     # Errors this many times as large as the noise of gauge and texture need a word.
-    if first.rmse_um < 1.3 * noise_um:
+    if first.rmse_um < 1.1 * noise_um:
         reason = 'The readings agree with the model to within the noise of the gauge.'
+    if doubt := state.study.level_doubt(first.fit.predicted_um):
+        unknown = locate_unexplained(state.study, first.fit, nothing, state.seed)
+        return state.diagnosis(
+            p_value, 'unknown_effect', f'{doubt} Beside it: {reason}', (), unknown
+        )
     return state.diagnosis(p_value, 'none_missing', reason)
 
 
@@ -190,6 +195,10 @@ def _conclude(
         return state.diagnosis(p_value, 'undecided', reason, others)
     unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
     reason = f'Something outside the library acts. {unknown}'
+    for over in (c.best.removeprefix('learned:') for c in state.accepted):
+        alike = [n for n, shapes in state.candidates.items() if over in shapes[0].covariates]
+        if alike:
+            reason += f' What depends on {over}, too, with another law: {", ".join(alike)}.'
     if len(set(best.usual.setting_of)) == 1:
         reason += (
             ' All parts were painted alike: it may belong to the part or to the spray. Spray '

@@ -64,9 +64,8 @@ class Unknown:
     def __str__(self) -> str:
         against = f'most against {self.covariate}' if self.is_clear else ''
         if not self.part:
-            return (
-                f'It shows {against}; {self.where}.' if against else f'{self.where.capitalize()}.'
-            )
+            words = f'it shows {against}; {self.where}.' if against else f'{self.where}.'
+            return words[0].upper() + words[1:]
         more, since = 'more' if self.mean_residual_um > 0.0 else 'less', ''
         on = f'on {", ".join(self.parts)}' if len(self.parts) > 1 else ''
         if self.since:
@@ -190,8 +189,11 @@ class Diagnosis:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Why what was known before does not suit this job, a sentence each."""
-        shift = self.pattern_shift
-        return (shift.warning, *self.remarks) if shift and shift.is_alarming else self.remarks
+        shift, doubt = self.pattern_shift, ''
+        if self.verdict != 'fit_broken':
+            doubt = self.study.level_doubt(self.history[-1].fit.predicted_um)
+        moved = (shift.warning,) if shift and shift.is_alarming else ()
+        return (*moved, *((doubt,) if doubt not in self.reason else ()), *self.remarks)
 
     @cached_property
     def pattern_shift(self) -> PatternShift | None:

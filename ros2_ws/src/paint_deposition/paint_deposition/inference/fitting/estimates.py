@@ -193,7 +193,7 @@ class DiscrepancyFigures:
         parts = f', parts painted alike by {100.0 * self.part_share:.1f} %'
         footprint = f'; the footprint differs from two Gaussians by {peak:.0f} % of its peak'
         return (
-            f'What no law explains: the film of a setting is off by {setting:.1f} % of its peak'
-            f'{parts if self.part_share else ""}, alike over about {1e3 * self.length_m:.0f} mm'
-            f'{footprint if peak else ""}.'
+            f'No law is exact: the film of a setting may be off by {setting:.1f} % of its peak'
+            f'{parts if self.part_share else ""}, alike over about {1e3 * self.length_m:.0f} mm, '
+            f'as usual sprays and these readings say{footprint if peak else ""}.'
         )
