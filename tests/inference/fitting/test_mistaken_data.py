@@ -140,6 +140,27 @@ def test_a_target_tells_the_unit_where_the_film_alone_does_not(panels):
     assert not stops
 
 
+def test_parts_whose_level_falls_by_more_than_usual_are_told():
+    parts = gauged(MODEL, 3, orders=(ORDERS[0],) * 4).experiments
+    assert pd.compare(of(*parts)).warnings == ()
+    falling = of(*map(scaled, parts, (1.1, 1.03, 0.95, 0.87)))
+    (warning,) = pd.compare(falling).warnings
+    assert 'part levels panel 1 +' in warning
+    assert ' %, falling; ' in warning
+    found = pd.diagnose(falling)
+    assert found.verdict == 'unknown_effect'
+    assert found.reason.startswith('Beside the model the parts differ by more than usual')
+    assert found.warnings == ()
+
+
+def test_a_model_for_another_flow_is_compared_as_it_is(panels):
+    """No level of parts and no gauge zero makes up for it."""
+    found = pd.compare(panels, of_level(1.4 * MODEL.planar.K1_cm3_per_s))
+    (warning,) = found.warnings
+    assert warning.startswith('the readings say 0.71 times the K1 of the model')
+    assert found.points.bias_um == pytest.approx(-0.4 * panels.readings.mean_um.mean(), rel=0.1)
+
+
 def test_a_comparison_warns_of_mirrored_and_names_swapped_readings_once(panels):
     first, second = panels.experiments
     bad, labels = swapped(first)

@@ -14,7 +14,12 @@ from paint_deposition.errors import ModelError
 from paint_deposition.inference.fitting import posterior as jobs
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
-from paint_deposition.inference.fitting.posterior import PatternShift, draw_models, posterior_of
+from paint_deposition.inference.fitting.posterior import (
+    PatternShift,
+    draw_models,
+    posterior_of,
+    with_mean_level,
+)
 from paint_deposition.model.eq1_pattern import EFFECT_BETWEEN_JOBS, PATTERN
 
 WITH_EFFECT = FreeParameters.of(pd.DepositionModel(), CornerSlowdown(gain=0.5, length_m=0.2))
@@ -41,7 +46,8 @@ def test_the_posterior_of_a_job_is_the_prior_of_the_next_widened(parameters, cam
     between = [c.between_jobs for c in PATTERN]
     between += [EFFECT_BETWEEN_JOBS] * (len(parameters) - len(PATTERN))
     assert prior.centre == pytest.approx(fit.vector)
-    widened = scaled_covariance(fit) + np.diag(np.square(between))
+    widened = scaled_covariance(fit, with_mean_level(fit, campaign))
+    widened += np.diag(np.square(between))
     assert prior.factor @ prior.factor.T == pytest.approx(widened, rel=1e-6, abs=1e-12)
 
 

@@ -157,7 +157,7 @@ def _side_by_side_lines(beside: pd.SideBySide) -> Iterator[str]:
     for name, comparison in beside.by_name.items():
         misfits = comparison.misfits.items()
         errors = [found.rmse_um for (_, kind, _), found in misfits if kind == 'experiment']
-        errors.insert(0, comparison.points.rmse_um)
+        errors.insert(0, comparison.readings.rmse_um)
         yield f'{name:{width}}' + ''.join(f'  {value:10.2f}' for value in errors)
     yield f'smallest error: {beside.best}'
 

@@ -18,8 +18,9 @@ from paint_deposition.inference.comparison.profiles import Profile, profiles_of
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
-from paint_deposition.inference.fitting.estimates import estimates
+from paint_deposition.inference.fitting.estimates import Estimate, estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
+from paint_deposition.inference.fitting.posterior import with_mean_level
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.readings import root_mean_square
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -252,7 +253,10 @@ def law_rows(data: ReportData) -> list[dict[str, str]]:
 
 def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     """The pattern's parameters; with 95 % intervals where the model was fitted."""
-    fitted = estimates(data.diagnosis.history[-1].fit.marginal) if data.diagnosis else ()
+    fitted: tuple[Estimate, ...] = ()
+    if data.diagnosis:
+        fit = data.diagnosis.history[-1].fit
+        fitted = estimates(fit.marginal, with_mean_level(fit, data.study.campaign))
     found = {estimate.name: estimate for estimate in fitted}
     brushes, rows = data.model.brushes, []
     of = [f'brush {brush.number}: ' if len(brushes) > 1 else '' for brush in brushes] or ['']

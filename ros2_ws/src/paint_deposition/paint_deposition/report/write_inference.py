@@ -29,6 +29,7 @@ from paint_deposition.inference.fitting.estimates import Estimate, estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
+from paint_deposition.inference.fitting.posterior import with_mean_level
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData, history_as_list
 from paint_deposition.report.drawing import save_picture
@@ -90,7 +91,9 @@ def _write_diagnosis(
     start = start or ModelFile(result.history[0].model)
     models = [folder / 'model_before.yaml', folder / 'model.yaml']
     for file, steps in zip(models, (result.history[:1], result.history), strict=True):
-        known = result.posterior_at(steps[-1]), estimates(steps[-1].fit.marginal)
+        fit = steps[-1].fit
+        off = with_mean_level(fit, result.study.campaign)
+        known = result.posterior_at(steps[-1]), estimates(fit.marginal, off)
         write_fitted(file, result.study, steps, *known, start)
     data = ReportData(result, start.history)
     return models + _write_results(folder, 'diagnosis.json', result.to_dict(), data, pictures)

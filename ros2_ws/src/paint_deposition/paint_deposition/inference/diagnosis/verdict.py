@@ -62,7 +62,7 @@ class Unknown:
     share: float
 
     def __str__(self) -> str:
-        against = f'most against {self.covariate}' if self.is_clear else ''
+        against = f'most against {self.covariate}' if self.p_value < ALPHA else ''
         if not self.part:
             words = f'it shows {against}; {self.where}.' if against else f'{self.where}.'
             return words[0].upper() + words[1:]
@@ -76,11 +76,6 @@ class Unknown:
             f'{abs(self.mean_residual_um):.1f} µm ({100.0 * abs(self.share):.0f} %) {more} than '
             f'the model says{since}{"; it shows " if shows else ""}{shows}.'
         )
-
-    @property
-    def is_clear(self) -> bool:
-        """Whether it depends on the covariate by more than chance."""
-        return self.p_value < ALPHA
 
 
 @dataclass(frozen=True)

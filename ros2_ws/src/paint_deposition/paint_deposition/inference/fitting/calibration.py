@@ -33,7 +33,11 @@ from paint_deposition.inference.fitting.panel import (
     short_reaches,
 )
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
-from paint_deposition.inference.fitting.posterior import posterior_of, with_brushes_of
+from paint_deposition.inference.fitting.posterior import (
+    posterior_of,
+    with_brushes_of,
+    with_mean_level,
+)
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import (
@@ -196,7 +200,8 @@ def calibrate(
     fit = best_fit(study)
     short = short_reaches(study.campaign, fit.model)
     moved = shifts(study, fit, short, best_fit)
-    values, pairs = estimates(fit.marginal, moved), correlations(fit.marginal, moved)
+    off = with_mean_level(fit, study.campaign, moved)
+    values, pairs = estimates(fit.marginal, off), correlations(fit.marginal, off)
     widened = 'the intervals are widened by what the fit changes without the readings at the ends'
     warnings = [*_warnings(study, fit, values, pairs), *impossible_brushes(fit.model)]
     warnings += [f'{reach}; {widened}' for reach in short.values()]

@@ -20,6 +20,7 @@ from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, sca
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
+from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.model.eq1_pattern import Brush, listed
 from paint_deposition.motion.trajectory import ONLY_BRUSH
@@ -43,7 +44,7 @@ def posterior_of(
     if footprint:
         footprint = float(f'{footprint[0]:.3g}'), float(f'{footprint[1]:.3g}')
     parameters = fit.parameters
-    scale = parameters.scale
+    scale, shifts = parameters.scale, with_mean_level(fit, campaign, shifts)
     covariance = scaled_covariance(fit.marginal, shifts) * np.outer(scale, scale)
     known = parameters.known.readings if parameters.known else ()
     return Posterior.of(
@@ -51,6 +52,14 @@ def posterior_of(
         0.5 * (covariance + covariance.T), readings=(*known, *campaign.fingerprints),
         process=campaign.settings, footprint=footprint,
     )  # fmt: skip
+
+
+def with_mean_level(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None) -> np.ndarray:
+    """(n, k) shifts of a fit's vector, and that by which the parts' mean level may be off."""
+    levels, pattern = np.zeros((1, len(fit.vector))), fit.parameters.pattern
+    log_k1 = [pattern.entries(row)[0] for row in range(pattern.count)]
+    levels[0, log_k1] = LEVEL_SHARE / np.sqrt(len(campaign.experiments))
+    return levels if shifts is None else np.vstack([shifts, levels])
 
 
 def of_brushes(

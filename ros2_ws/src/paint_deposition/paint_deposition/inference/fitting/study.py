@@ -386,9 +386,13 @@ class Study:
 
 
 def _beside(columns: np.ndarray, misfit: np.ndarray) -> np.ndarray:
-    """(..., P) what directions (P, n), of unit variance, leave of a misfit over the noise."""
+    """(..., P) what directions (P, n), of unit variance, leave of a misfit over the noise.
+
+    No level is taken to be further off than four standard deviations: the model is.
+    """
     precision = np.eye(columns.shape[1]) + columns.T @ columns
-    return misfit - misfit @ columns @ np.linalg.solve(precision, columns.T)
+    amplitudes = np.clip(misfit @ columns @ np.linalg.inv(precision), -4.0, 4.0)
+    return misfit - amplitudes @ columns.T
 
 
 def _columns(effects: Sequence[RandomEffects], count: int) -> np.ndarray:
