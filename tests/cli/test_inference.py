@@ -209,13 +209,11 @@ def test_the_strongest_misfits_are_printed_and_how_many_more_there_are(door_alon
     done = ran('refit', campaign, '--add', 'none', '-o', tmp_path / 'refit')
     regions = told_in(tmp_path / 'refit' / 'diagnosis.json')['regions']
     lines = (done.stdout + done.stderr).splitlines()
-    shown = [line for line in lines if line.startswith('misfit before: ')]
-    strongest = [
-        f'misfit before: {one["experiment"]}: {one["description"]}' for one in regions[:5]
-    ]
+    shown = [line for line in lines if line.startswith('misfit: ')]
+    strongest = [f'misfit: {one["experiment"]}: {one["description"]}' for one in regions[:5]]
     assert shown == strongest
     assert len(regions) > 5
-    assert f'{len(regions) - 5} weaker misfits before are in diagnosis.json' in lines
+    assert f'{len(regions) - 5} weaker misfits are in diagnosis.json' in lines
 
 
 @pytest.mark.slow

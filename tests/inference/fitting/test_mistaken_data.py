@@ -149,6 +149,7 @@ def test_parts_whose_level_falls_by_more_than_usual_are_told():
     assert ' %, falling; ' in warning
     found = pd.diagnose(falling)
     assert found.verdict == 'unknown_effect'
+    assert found.p_value < 0.02
     assert found.reason.startswith('Beside the model the parts differ by more than usual')
     assert found.warnings == ()
 

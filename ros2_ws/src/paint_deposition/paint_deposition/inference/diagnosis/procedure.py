@@ -117,7 +117,9 @@ def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) 
     # Errors this many times as large as the noise of gauge and texture need a word.
     if first.rmse_um < 1.1 * noise_um:
         reason = 'The readings agree with the model to within the noise of the gauge.'
-    if doubt := state.study.level_doubt(first.fit.predicted_um):
+    p_of_levels, doubt = state.study.level_doubt(first.fit.predicted_um)
+    if doubt:
+        p_value = min(p_value, p_of_levels)
         unknown = locate_unexplained(state.study, first.fit, nothing, state.seed)
         return state.diagnosis(
             p_value, 'unknown_effect', f'{doubt} Beside it: {reason}', (), unknown

@@ -219,15 +219,15 @@ class Study:
         """(P, n) nuisance directions over the noise: those of the random effects."""
         return _columns(self.random_effects, len(self))
 
-    def level_doubt(self, predicted_um: np.ndarray) -> str:
-        """That parts and gauge sessions differ by more than usual ones do; '' if they do not.
+    def level_doubt(self, predicted_um: np.ndarray) -> tuple[float, str]:
+        """Probability that usual parts and gauge sessions differ so, and how; '' if they may.
 
         Args:
             predicted_um: (P,) film of a model [um].
         """
         columns, effects = self.nuisance, self.random_effects
         if not effects:
-            return ''
+            return 1.0, ''
         misfit = (self.measured_um - predicted_um) / self.sigma_um
         # Amplitudes of unit variance, and the share of it that the readings tell.
         precision = np.eye(columns.shape[1]) + columns.T @ columns
@@ -238,7 +238,7 @@ class Study:
         square = float(np.sum((ways[:, seen].T @ mean) ** 2 / shares[seen]))
         p_value = float(chi2.sf(square, np.count_nonzero(seen)))
         if p_value > UNUSUAL:
-            return ''
+            return p_value, ''
         first, levels = 0, []
         for each in effects:
             values = each.mixing @ mean[first : first + len(each.names)]
@@ -250,7 +250,7 @@ class Study:
             steps = np.diff(values)
             way = ', rising' if (steps > 0.0).all() else ', falling' if (steps < 0.0).all() else ''
             levels.append(f'{each.kind}s {told}{way}')
-        return (
+        return p_value, (
             f'Beside the model the parts differ by more than usual parts do (p = {p_value:.2g}): '
             f'{"; ".join(levels)}. Check flow, booth and gauge from part to part.'
         )
