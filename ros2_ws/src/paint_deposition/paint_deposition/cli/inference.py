@@ -295,11 +295,11 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[s
     if diagnosis.pattern_shift:
         yield f'pattern moved {diagnosis.pattern_shift}'
     yield from (f'{amount}' for amount in diagnosis.random_effects if amount.is_notable)
-    regions, before = diagnosis.comparisons[0].regions, ' before' if diagnosis.accepted else ''
+    regions, when = diagnosis.comparisons[0].regions, ' before' if diagnosis.accepted else ''
     for region in regions[:MISFITS]:
-        yield f'misfit{before}: {region.experiment}: {region.description}'
+        yield f'misfit{when}: {region.experiment}: {region.description}'
     if len(regions) > MISFITS:
-        yield f'{len(regions) - MISFITS} weaker misfits{before} are in diagnosis.json'
+        yield f'{len(regions) - MISFITS} weaker misfits{when} are in diagnosis.json'
     if diagnosis.calibrate_first:
         yield (
             'next: paint calibrate a flat panel, and diagnose with its model: a pattern that is '

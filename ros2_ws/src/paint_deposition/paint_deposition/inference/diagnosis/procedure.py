@@ -119,11 +119,8 @@ def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) 
         reason = 'The readings agree with the model to within the noise of the gauge.'
     p_of_levels, doubt = state.study.level_doubt(first.fit.predicted_um)
     if doubt:
-        p_value = min(p_value, p_of_levels)
-        unknown = locate_unexplained(state.study, first.fit, nothing, state.seed)
-        return state.diagnosis(
-            p_value, 'unknown_effect', f'{doubt} Beside it: {reason}', (), unknown
-        )
+        reason = f'{doubt} Beside it: {reason[0].lower()}{reason[1:]}'
+        return state.diagnosis(min(p_value, p_of_levels), 'unknown_effect', reason)
     return state.diagnosis(p_value, 'none_missing', reason)
 
 
