@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
@@ -80,6 +80,27 @@ def poses(motion: Trajectory, rows: slice) -> PoseBatch:
     return PoseBatch(
         motion.stamps_ns[rows], motion.positions_m[rows], motion.quaternions_xyzw[rows]
     )
+
+
+def streamed(
+    motion: Trajectory, sizes: list[int], whole_strokes: bool
+) -> tuple[list[SprayPath], PoseCounts]:
+    """Sub-steps of poses that come in batches of these sizes, in turns, with their triggers."""
+    builder = PathBuilder(whole_strokes=whole_strokes)
+    first, *triggers = zip(motion.trigger_stamps_ns, motion.trigger_flow, strict=True)
+    builder.add_trigger(*first)
+    pieces = []
+    start, turn = 0, 0
+    while start < len(motion):
+        rows = slice(start, start + sizes[turn % len(sizes)])
+        start, turn = rows.stop, turn + 1
+        builder.add_poses(poses(motion, rows))
+        newest = motion.stamps_ns[rows][-1]
+        while triggers and triggers[0][0] <= newest:
+            builder.add_trigger(*triggers.pop(0))
+        pieces.append(builder.take(newest - 100_000_000))
+    pieces.append(builder.take(finish=True))
+    return pieces, builder.screen.counts
 
 
 def changes_of(motion: Trajectory) -> list[TriggerChange]:
