@@ -1,5 +1,7 @@
 """Small worlds for tests: a gun, a way for it, and surface to paint."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -73,6 +75,12 @@ def painted(
     integrator = FilmIntegrator(points, model, precision, occluder, **options)
     integrator.add(path)
     return integrator
+
+
+def rows_of(motion: Trajectory, rows: slice | np.ndarray, **told) -> Trajectory:
+    """Some of its poses, with what else is told of it."""
+    columns = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
+    return replace(motion, **{name: getattr(motion, name)[rows] for name in columns} | told)
 
 
 def poses(motion: Trajectory, rows: slice) -> PoseBatch:

@@ -62,8 +62,7 @@ def test_the_trigger_cuts_within_a_segment_and_a_gap_is_gun_off():
 @pytest.mark.parametrize('whole_strokes', [False, True])
 def test_a_stream_that_begins_again_is_painted_again(whole_strokes):
     once = to_and_fro()
-    names = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
-    twice = Trajectory(*(np.concatenate(2 * [getattr(once, n)]) for n in names), **TRIGGER)
+    twice = scenes.rows_of(once, np.tile(np.arange(len(once)), 2))
     single, _ = spray_path(once)
     path, counts = spray_path(twice, whole_strokes=whole_strokes)
     assert (counts.restarts, counts.rejected, counts.gaps) == (1, 0, 0)

@@ -22,7 +22,7 @@ from paint_deposition.planning.part_places import PartPlaces, part_places
 from paint_deposition.planning.plan import driven, plan
 from paint_deposition.planning.programme import Programme
 from paint_deposition.planning.requests import PlanRequest
-from scenes import painted
+from scenes import painted, rows_of
 from surfaces import sheet
 
 pytestmark = pytest.mark.slow
@@ -141,9 +141,7 @@ def test_a_turn_beside_the_passes_slows_itself_only(cell):
 
 def test_a_motion_that_is_slowed_down_has_no_gaps(planned, cell):
     """Poses 80 ms apart are nearly a second apart at a tenth of their speed."""
-    dense = planned.trajectory
-    columns = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
-    few = replace(dense, **{name: getattr(dense, name)[::20] for name in columns})
+    few = rows_of(planned.trajectory, slice(None, None, 20))
     slow = replace(cell, arm=replace(cell.arm, fastest=0.05 * cell.arm.fastest))
     drive = slow.drive(few, free_roll=False)
     assert drive.limits
