@@ -12,9 +12,9 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import PathBuilder, spray_path
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
-from scenes import poses, stamps_ns
+from scenes import stamps_ns
 from surfaces import on_grid
 
 SAMPLES = Path(__file__).resolve().parent.parent / 'ros2_ws/src/paint_deposition/samples'
@@ -125,19 +125,3 @@ def spread_m(film_um: np.ndarray, points: SurfacePoints) -> float:
     """Root mean square distance of the paint from its centre."""
     away_m2 = ((points.positions_m - centroid_m(film_um, points)) ** 2).sum(axis=1)
     return float(np.sqrt(volume_cm3(film_um * away_m2, points) / volume_cm3(film_um, points)))
-
-
-def in_batches(trajectory: pd.Trajectory, count: int, whole_strokes: bool):
-    """The sub-steps as a live node gets them: a few poses at a time, triggers when due."""
-    builder = PathBuilder(whole_strokes=whole_strokes)
-    triggers = list(zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True))
-    if triggers:
-        builder.add_trigger(*triggers.pop(0))
-    for start in range(0, len(trajectory), count):
-        rows = slice(start, start + count)
-        stamps = trajectory.stamps_ns[rows]
-        while triggers and triggers[0][0] <= stamps[-1]:
-            builder.add_trigger(*triggers.pop(0))
-        builder.add_poses(poses(trajectory, rows))
-        yield builder.take(int(stamps[-1]))
-    yield builder.take(finish=True)

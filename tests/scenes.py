@@ -1,14 +1,16 @@
 """Small worlds for tests: a gun, a way for it, and surface to paint."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
@@ -75,11 +77,38 @@ def painted(
     return integrator
 
 
+def rows_of(motion: Trajectory, rows: slice | np.ndarray, **told) -> Trajectory:
+    """Some of its poses, with what else is told of it."""
+    columns = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
+    return replace(motion, **{name: getattr(motion, name)[rows] for name in columns} | told)
+
+
 def poses(motion: Trajectory, rows: slice) -> PoseBatch:
     """Some poses as they come in."""
     return PoseBatch(
         motion.stamps_ns[rows], motion.positions_m[rows], motion.quaternions_xyzw[rows]
     )
+
+
+def streamed(
+    motion: Trajectory, sizes: list[int], whole_strokes: bool
+) -> tuple[list[SprayPath], PoseCounts]:
+    """Sub-steps of poses that come in batches of these sizes, in turns, with their triggers."""
+    builder = PathBuilder(whole_strokes=whole_strokes)
+    first, *triggers = zip(motion.trigger_stamps_ns, motion.trigger_flow, strict=True)
+    builder.add_trigger(*first)
+    pieces = []
+    start, turn = 0, 0
+    while start < len(motion):
+        rows = slice(start, start + sizes[turn % len(sizes)])
+        start, turn = rows.stop, turn + 1
+        builder.add_poses(poses(motion, rows))
+        newest = motion.stamps_ns[rows][-1]
+        while triggers and triggers[0][0] <= newest:
+            builder.add_trigger(*triggers.pop(0))
+        pieces.append(builder.take(newest - 100_000_000))
+    pieces.append(builder.take(finish=True))
+    return pieces, builder.screen.counts
 
 
 def changes_of(motion: Trajectory) -> list[TriggerChange]:

@@ -19,12 +19,8 @@ matplotlib.use('Agg')
 
 
 @pytest.fixture(scope='module')
-def panel():
-    return pd.read_mesh(SAMPLES / 'panel.stl', max_edge_length_m=0.05)
-
-
-@pytest.fixture(scope='module')
-def film(panel):
+def film():
+    panel = pd.read_mesh(SAMPLES / 'panel.stl', max_edge_length_m=0.05)
     recording = pd.read_recording(SAMPLES / 'panel_577', state_topic='/atomizer/state')
     readings = pd.read_readings(SAMPLES / 'panel_study/panel_577.csv')
     return pd.simulate(panel, recording, readings=readings)

@@ -1,7 +1,6 @@
 """A sweep: what it varies, the films of single runs, and nothing computed twice."""
 
 import hashlib
-import json
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 
@@ -13,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from booth import SAMPLES, spot
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, figures_of, paint, ran
 from paint_deposition.batch import sweep_file
 from paint_deposition.batch.cases import compute, workers
 from paint_deposition.batch.job import Job, computed
@@ -23,6 +22,7 @@ from paint_deposition.errors import BatchError
 from paint_deposition.files.effect_file import effects_allowed
 from paint_deposition.model.eq1_pattern import Brush, PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
+from refusals import refusal
 
 DOOR = SAMPLES / 'measured_door'
 EDGE_M = 0.08
@@ -82,13 +82,13 @@ def test_films_are_those_of_single_runs_by_any_executor(sweep_path, tmp_path, by
 @pytest.mark.slow
 def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_path, tmp_path, at_worker):
     output = tmp_path / 'out'
-    told = json.loads(paint('sweep', sweep_path, '-o', output, *at_worker, '--json').stdout)
+    told = figures_of('sweep', sweep_path, '-o', output, *at_worker, '--json')
     assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
     assert told['judged_by'] == 'sigma_n'
     first = pq.read_table(output / 'cases.parquet')
     kept = sorted((output / 'finished').iterdir())
     kept[2].unlink()
-    again = json.loads(paint('sweep', sweep_path, '-o', output, *at_worker, '--json').stdout)
+    again = figures_of('sweep', sweep_path, '-o', output, *at_worker, '--json')
     assert again['computed'] == 1
     assert pq.read_table(output / 'cases.parquet').equals(first)
     assert first['speed_factor'].to_pylist() == SPEEDS * 2
@@ -129,8 +129,7 @@ def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path, at_work
     told = {'max_edge_length_m': EDGE_M, 'cases': [{'standoff_change_m': 30.0}, {'effects': []}]}
     told |= {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory')}
     (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
-    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *at_worker)
-    assert done.returncode == 0, done.stderr
+    done = ran('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *at_worker)
     assert 'warning: case 1: ' in done.stderr
     assert 'best by unevenness σ_N: case 2, effects []' in done.stdout
     assert (tmp_path / 'out/sweep.png').stat().st_size > 10_000
@@ -242,11 +241,9 @@ def test_what_makes_no_sense_is_refused(told, words):
 def test_a_sweep_file_is_refused_in_a_line(tmp_path, text, words):
     path = tmp_path / 'sweep.yaml'
     path.write_text(text)
-    with pytest.raises(BatchError) as refused:
-        sweep_file.read_sweep(path)
-    assert words in str(refused.value)
-    assert str(path) in str(refused.value)
-    assert '\n' not in str(refused.value)
+    line = refusal(BatchError, sweep_file.read_sweep, path)
+    assert words in line
+    assert str(path) in line
 
 
 def test_a_model_is_varied_and_its_bounds_hold():

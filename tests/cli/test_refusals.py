@@ -49,7 +49,7 @@ def jobs(tmp_path_factory):
     ('simulate --mesh panel.stl --trajectory part_pose.csv', 'part_pose.csv: no such file'),
     (f'{PANEL} --model nowhere.yaml', 'nowhere.yaml|no such file'),
     (f'{PANEL} --mesh-scale -1', '--mesh-scale|-1'),
-    (f'{PANEL} --max-edge-length-m 1e-6', 'max_edge_length_m|give an edge length of at least'),
+    (f'{PANEL} --max-edge-length-m 1e-6', 'max_edge_length_m = 1e-06 m would|at least 0.00'),
     (f'{PANEL} --tolerance-um 3', '--target-um'),
     (f'{PANEL} --tolerance-um 60 --target-um 45', 'bare metal would be within it'),
     (f'{PANEL} --down 0 0 0', 'down|give the direction of gravity'),

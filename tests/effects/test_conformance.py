@@ -144,7 +144,7 @@ def test_a_stream_paints_what_the_recording_does(effect: type[Effect]):
     whole = booth.painted(booth.panel(0.3, 0.05), trajectory, effect.typical())
     part = booth.panel(0.3, 0.05)
     live = FilmIntegrator(part.points(), model, 'double', part, parallel=False)
-    for piece in booth.in_batches(trajectory, 7, model.needs_whole_strokes):
+    for piece in scenes.streamed(trajectory, [7], model.needs_whole_strokes)[0]:
         live.add(piece)
     assert np.array_equal(live.gauge_um, whole.gauge_um)
     assert live.used.emitted_cm3 == pytest.approx(whole.used.emitted_cm3, rel=1e-12)

@@ -19,8 +19,7 @@ from paint_deposition.part.points import SurfacePoints
 from reference import reference_film_um
 
 LAW = pytest.mark.parametrize('law', CURVES.values(), ids=CURVES)
-RAY_LAWS = [law for law in CURVES.values() if law.flux_factor is not None]
-RAY_LAW = pytest.mark.parametrize('law', RAY_LAWS, ids=lambda law: law.covariate)
+RAY_LAWS = {name: law for name, law in CURVES.items() if law.flux_factor is not None}
 PATH_LAWS = ('time_s', 'spray_pass', 'stroke_end_m', 'since_trigger_s', 'speed_m_per_s')
 SURFACE_LAWS = (
     'curvature_per_m', 'edge_distance_m', 'sky_view_factor', 'height_fraction', 'across_m',
@@ -116,7 +115,7 @@ def test_an_addition_leaves_bare_metal_bare_and_takes_no_more_than_is_there():
 
 
 @pytest.mark.slow
-@RAY_LAW
+@pytest.mark.parametrize('law', RAY_LAWS.values(), ids=RAY_LAWS)
 def test_a_law_over_the_ray_acts_where_the_covariate_is_in_range_as_the_kernel_computes_it(law):
     """A gun at rest before a flat panel: each point has one incidence, all the same distance."""
     points, path = panel().points(), path_of(spot())

@@ -215,10 +215,9 @@ def test_what_is_wrong_is_named_with_the_remedy(bracket, zones, message):
 
 
 @pytest.mark.parametrize('text', ['', 'zones: []', 'zones: {a: 1}', 'zone: [{name: a}]'])
-def test_a_file_without_zones_is_refused(tmp_path, text):
-    (tmp_path / 'zones.yaml').write_text(text)
+def test_a_file_without_zones_is_refused(tmp_path, file, text):
     with pytest.raises(pd.PaintError, match='zones'):
-        pd.read_zones(tmp_path / 'zones.yaml', tmp_path / 'part.stl')
+        pd.read_zones(file('zones.yaml', text), tmp_path / 'part.stl')
 
 
 MODEL = two_brushes(effects=(EFFECTS['edge_build'].typical(),))
@@ -243,28 +242,26 @@ def test_brushes_are_written_and_read_back_without_loss(tmp_path: Path):
     assert model_digest(other) != model_digest(MODEL) == model_digest(read_model(path))
 
 
-def test_a_table_of_poses_names_the_brush_from_its_row_on(tmp_path: Path):
-    path, states = tmp_path / 'poses.csv', ('1,2', '1,3', '0,0', '1,2')
+def test_a_table_of_poses_names_the_brush_from_its_row_on(file):
+    states = '1,2', '1,3', '0,0', '1,2'
     rows = ''.join(f'0.{k},{POSE},{state}\n' for k, state in enumerate(states))
-    path.write_text(f't,{HEAD},gun,brush\n{rows}')
-    read = read_recording(path)
+    read = read_recording(file('poses.csv', f't,{HEAD},gun,brush\n{rows}'))
     assert read.trigger_flow.tolist() == [1.0, 1.0, 0.0, 1.0]
     assert read.trigger_brush.tolist() == [2, 3, 0, 2]
     assert 'gun by gun, brush by brush' in read.notes[0]
     # Without a trigger the gun sprays throughout, with these brushes.
-    path.write_text(f't,{HEAD},brush\n0,{POSE},2\n0.1,{POSE},3\n')
+    path = file('poses.csv', f't,{HEAD},brush\n0,{POSE},2\n0.1,{POSE},3\n')
     assert [(flow, brush) for _, flow, brush in read_recording(path).triggers] == [(1, 2), (1, 3)]
-    path.write_text(f't,{HEAD},brush\n0,{POSE},2\n0.1,{POSE},2.5\n')
+    path = file('poses.csv', f't,{HEAD},brush\n0,{POSE},2\n0.1,{POSE},2.5\n')
     with pytest.raises(RecordingError, match=r'line 3: brush is 2\.5; give the number of a brush'):
         read_recording(path)
 
 
-def test_a_programmed_table_takes_the_brush_of_each_move(tmp_path: Path):
-    path = tmp_path / 'passes.csv'
-    path.write_text(
+def test_a_programmed_table_takes_the_brush_of_each_move(file):
+    text = (
         f'{HEAD},speed_m_per_s,spraying,brush\n'
         '0,0,0,1,0,0,0,1,0,0\n0.5,0,0,1,0,0,0,1,1,4\n1,0,0,1,0,0,0,1,1,9\n2,0,0,1,0,0,0,1,0,9\n'
     )
-    assert read_recording(path).triggers == [
+    assert read_recording(file('passes.csv', text)).triggers == [
         (0, 1.0, 4), (500_000_000, 1.0, 9), (1_000_000_000, 0.0, 9)
     ]  # fmt: skip

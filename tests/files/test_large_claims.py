@@ -40,15 +40,16 @@ def _ply(form: str, vertices: int, faces: int) -> bytes:
     return PLY.format(form=form, vertices=vertices, faces=faces).encode() + bytes(200)
 
 
-def _mcap_chunk() -> bytes:
-    """A zstd chunk that is said to become very large."""
-    records = b'\x28\xb5\x2f\xfd' + bytes(20)
-    content = struct.pack('<QQQII', 0, 1, 2**40, 0, 4) + b'zstd'
-    content += struct.pack('<Q', len(records)) + records
-    magic = b'\x89MCAP0\r\n'
-    header = b'\x01' + struct.pack('<QI4sI', 12, 4, b'ros2', 0)
+def _mcap_chunk(claimed: int, data: bytes) -> bytes:
+    """A bag of one zstd chunk that is said to become so large."""
+    plain = targets()['mcap'].seeds[0]
+    content = struct.pack('<QQQII', 0, 1, claimed, 0, 4) + b'zstd'
+    content += struct.pack('<Q', len(data)) + data
     chunk = b'\x06' + struct.pack('<Q', len(content)) + content
-    return magic + header + chunk + b'\x02' + struct.pack('<QQQI', 20, 0, 0, 0) + magic
+    head = 8 + 9 + struct.unpack('<Q', plain[9:17])[0]
+    data_end = b'\x0f' + struct.pack('<QI', 4, 0)
+    footer = b'\x02' + struct.pack('<QQQI', 20, 0, 0, 0)
+    return plain[:head] + chunk + data_end + footer + plain[:8]
 
 
 def _doubled(around: bytes) -> bytes:
@@ -61,18 +62,10 @@ def _doubled(around: bytes) -> bytes:
 
 
 def _bomb_chunk() -> bytes:
-    """A bag whose chunk of 100 kB expands to 3 GB, as it says."""
-    plain = targets()['mcap'].seeds[0]
+    """Its 100 kB expand to 3 GB, as it says."""
     compressor = zstandard.ZstdCompressor().compressobj(size=3 * CLAIMED)
     parts = [compressor.compress(bytes(10**7)) for _ in range(300)]
-    data = b''.join([*parts, compressor.flush()])
-    content = struct.pack('<QQQII', 0, 1, 3 * CLAIMED, 0, 4) + b'zstd'
-    content += struct.pack('<Q', len(data)) + data
-    chunk = b'\x06' + struct.pack('<Q', len(content)) + content
-    head = 8 + 9 + struct.unpack('<Q', plain[9:17])[0]
-    data_end = b'\x0f' + struct.pack('<QI', 4, 0)
-    footer = b'\x02' + struct.pack('<QQQI', 20, 0, 0, 0)
-    return plain[:head] + chunk + data_end + footer + plain[:8]
+    return _mcap_chunk(3 * CLAIMED, b''.join([*parts, compressor.flush()]))
 
 
 def _mcap_with(field: bytes) -> bytes:
@@ -128,7 +121,9 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'faces of a text PLY': ('ply', lambda: _ply('ascii', 3, CLAIMED)),
     'triangles of an STL': ('stl', lambda: bytes(80) + struct.pack('<I', CLAIMED) + bytes(50)),
     'a chunk of a glTF': ('glb', lambda: struct.pack('<4s4I', b'glTF', 2, 20, 4 * CLAIMED, J)),
-    'a zstd chunk to recover': ('mcap_recovery', _mcap_chunk),
+    'a zstd chunk to recover': (
+        'mcap_recovery', lambda: _mcap_chunk(2**40, b'\x28\xb5\x2f\xfd' + bytes(20)),
+    ),
     'lists of YAML': ('model', lambda: b'name: ' + b'[' * 100_000),
     'nested YAML': ('model', lambda: b'- ' * 100_000),
     'aliases of YAML': ('model', lambda: _doubled(b'[%s]')),
@@ -194,9 +189,8 @@ def test_a_recording_compressed_as_a_whole_is_not_expanded_beyond_measure(tmp_pa
         pass
 
 
-def test_ten_thousand_headings_are_not_all_shown(tmp_path):
-    path = tmp_path / 'wide.csv'
-    path.write_text(','.join(['x_m'] * 10_000) + '\n' + ','.join(['1'] * 10_000) + '\n')
+def test_ten_thousand_headings_are_not_all_shown(file):
+    path = file('wide.csv', '\n'.join(','.join(10_000 * [cell]) for cell in ('x_m', '1')) + '\n')
     line = refusal(PaintError, targets()['readings'].read, path)
     assert len(line) < 1000
     assert 'and 9980 more' in line

@@ -27,12 +27,6 @@ def change(time_s: float, flow: float) -> TriggerChange:
     return TriggerChange(int(stamps_ns(time_s)), flow)
 
 
-def part_of(motion, first: int, **told):
-    """From this pose on, with what else is told of it."""
-    columns = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
-    return replace(motion, **{name: getattr(motion, name)[first:] for name in columns} | told)
-
-
 def followed(coming, model=MODEL, **options):
     film = LiveFilm(lying_plane(), model, **options)
     film.replay(coming)
@@ -134,7 +128,7 @@ def test_a_state_that_is_told_ahead_holds_though_the_film_is_reset_before_its_po
     nowhen = poses(motion, slice(before, before + 1))
     film.add_poses(replace(nowhen, stamps_ns=np.zeros(1, np.int64)))
     film.add_poses(poses(motion, slice(before, None)))
-    rest = painted(lying_plane(), part_of(motion, before))
+    rest = painted(lying_plane(), scenes.rows_of(motion, slice(before, None)))
     assert np.array_equal(film.snapshot().film_um, rest.film_um)
 
 
@@ -199,9 +193,8 @@ def test_a_film_that_goes_on_begins_with_what_it_says_though_the_clock_is_set_ba
     film = followed([*states, poses(motion, slice(0, half))])
     film.reset()
     assert film.carried_over == [last]
-    trigger = {'trigger_stamps_ns': last.stamp_ns, 'trigger_flow': last.flow}
-    told = {name: np.array([value]) for name, value in trigger.items()}
-    begun = part_of(motion, half, stamps_ns=stamps[half:], **told)
+    told = {'trigger_stamps_ns': np.array([last.stamp_ns]), 'trigger_flow': np.ones(1)}
+    begun = scenes.rows_of(replace(motion, stamps_ns=stamps), slice(half, None), **told)
     film.add_poses(poses(begun, slice(None)))
     offline = painted(lying_plane(), begun)
     assert np.array_equal(film.snapshot().film_um, offline.film_um)

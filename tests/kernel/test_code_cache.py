@@ -27,15 +27,12 @@ def scaling(factor):
     return njit(cache=True)(named_for_its_code(variant, [], factor))
 
 
-@pytest.fixture
-def empty_cache(tmp_path, monkeypatch):
+def test_variants_have_files_of_their_own_so_that_processes_cannot_swap_them(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr(numba.config, 'CACHE_DIR', str(tmp_path))
-    return tmp_path
-
-
-def test_variants_have_files_of_their_own_so_that_processes_cannot_swap_them(empty_cache):
     assert [scaling(factor)(10.0) for factor in (2.0, 3.0)] == [20.0, 30.0]
-    assert len(list(empty_cache.rglob('*.nbi'))) == 2
+    assert len(list(tmp_path.rglob('*.nbi'))) == 2
     for factor in (2.0, 3.0):
         loaded = scaling(factor)
         assert loaded(10.0) == 10.0 * factor

@@ -59,14 +59,11 @@ def test_exact_where_effects_rely_on_it(real):
     assert np.array_equal(exp2_all(whole), 2.0 ** whole.astype(float))
 
 
-@pytest.mark.parametrize(('real', 'floor'), FLOORS.items())
-def test_below_the_floor_it_stays_there(real, floor):
+@pytest.mark.parametrize(('real', 'ceiling'), [(np.float32, 126.0), (np.float64, 1023.0)])
+def test_below_the_floor_and_above_the_ceiling_an_exponential_stays_there(real, ceiling):
+    floor = FLOORS[real]
     far = np.array([floor, 2 * floor, -1e6, -1e30], real)
     assert exp2_all(far).tolist() == [2.0**floor] * 4
-
-
-@pytest.mark.parametrize(('real', 'ceiling'), [(np.float32, 126.0), (np.float64, 1023.0)])
-def test_above_the_ceiling_an_exponential_stays_there(real, ceiling):
     far = np.array([0.695 * ceiling, 1e3, 1e6, 1e30], real)
     assert exp_all(far).tolist() == [2.0**ceiling] * 4
     assert power_all(np.full(1, 1e30, real), real(20.0)).tolist() == [2.0**ceiling]

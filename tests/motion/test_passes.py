@@ -45,7 +45,7 @@ def turn_points(kind, radius_m):
     return points, 0.3
 
 
-def raster(kind, radius_m, gun, noise_m=0.0, period_s=0.004):
+def raster(kind, radius_m, gun, noise_m, period_s):
     """To and fro in x-y; the gun is off in the turns, always on, or without trigger."""
     points, rise_m = turn_points(kind, radius_m)
     corners = []
@@ -66,16 +66,13 @@ def raster(kind, radius_m, gun, noise_m=0.0, period_s=0.004):
     return level(at_m / SPEED_M_PER_S, xy, noise_m, **trigger)
 
 
-def assert_passes_are_the_rows(path):
-    """Four passes; every row has its own number from 0.1 m behind the turn to the next."""
-    assert path.spray_pass.max() == PASSES - 1
-    middle = (path.flow > 0.0) & (np.abs(path.position_m[:, 0] - 0.5 * LENGTH_M) < 0.5)
-    y = path.position_m[middle, 1]
-    rows = np.round((PASSES - 1) * (y - y.min()) / np.ptp(y)).astype(int)
-    assert np.array_equal(path.spray_pass[middle], rows)
-
-
-@pytest.mark.parametrize('gun', ['off in turns', 'on', 'no trigger'])
+@pytest.mark.parametrize(
+    ('gun', 'period_s', 'noise_m'),
+    [
+        ('off in turns', 0.004, 2e-4), ('on', 0.004, 2e-4), ('no trigger', 0.004, 2e-4),
+        ('on', 0.001, 2e-5), ('on', 0.03, 2e-4),
+    ],
+)  # fmt: skip
 @pytest.mark.parametrize(
     ('kind', 'size_m'),
     [
@@ -83,16 +80,14 @@ def assert_passes_are_the_rows(path):
         ('semicircle', 0.29), ('zone', 0.01), ('zone', 0.05), ('zone', 0.14),
     ],
 )  # fmt: skip
-def test_every_row_of_a_raster_is_a_pass(kind, size_m, gun):
-    path, _ = spray_path(raster(kind, size_m, gun, noise_m=2e-4))
-    assert_passes_are_the_rows(path)
-
-
-@pytest.mark.parametrize(('period_s', 'noise_m'), [(0.001, 2e-5), (0.03, 2e-4)])
-def test_the_rate_of_the_poses_does_not_matter(period_s, noise_m):
-    for kind, size_m in (('corner', 0.3), ('semicircle', 0.05), ('semicircle', 0.29)):
-        path, _ = spray_path(raster(kind, size_m, 'on', noise_m, period_s))
-        assert_passes_are_the_rows(path)
+def test_every_row_of_a_raster_is_a_pass_at_any_rate(kind, size_m, gun, period_s, noise_m):
+    """Four passes; every row has its own number from 0.1 m behind the turn to the next."""
+    path, _ = spray_path(raster(kind, size_m, gun, noise_m, period_s))
+    assert path.spray_pass.max() == PASSES - 1
+    middle = (path.flow > 0.0) & (np.abs(path.position_m[:, 0] - 0.5 * LENGTH_M) < 0.5)
+    y = path.position_m[middle, 1]
+    rows = np.round((PASSES - 1) * (y - y.min()) / np.ptp(y)).astype(int)
+    assert np.array_equal(path.spray_pass[middle], rows)
 
 
 def arc_pass(radius_m, sweep_rad, followed, noise_m=2e-4):
@@ -246,8 +241,7 @@ def lines_of(trajectory: Trajectory, max_pose_gap_s: float = 0.25) -> list[str]:
 
 def rows(*chosen: np.ndarray, **trigger) -> Trajectory:
     row = np.concatenate([np.flatnonzero(each) for each in chosen])
-    columns = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
-    return Trajectory(*(getattr(WHOLE, name)[row] for name in columns), **trigger)
+    return scenes.rows_of(WHOLE, row, **trigger)
 
 
 def test_a_gap_while_the_gun_sprays_is_named_with_its_place_and_paint():

@@ -22,24 +22,6 @@ CHANGES_NS = scenes.stamps_ns([0.0, 0.5037, 1.9, 2.4, 3.3])
 TRIGGER = {'trigger_stamps_ns': CHANGES_NS, 'trigger_flow': np.array([0.0, 1.0, 0.0, 0.7, 0.0])}
 
 
-def streamed(trajectory, sizes, whole_strokes=False, lag_ns=100_000_000):
-    """The path of poses that come in batches of these sizes, in turns, with their triggers."""
-    builder = PathBuilder(whole_strokes=whole_strokes)
-    triggers = list(zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True))
-    pieces = []
-    start, turn = 0, 0
-    while start < len(trajectory):
-        rows = slice(start, start + sizes[turn % len(sizes)])
-        start, turn = rows.stop, turn + 1
-        builder.add_poses(scenes.poses(trajectory, rows))
-        newest = trajectory.stamps_ns[rows][-1]
-        while triggers and triggers[0][0] <= newest:
-            builder.add_trigger(*triggers.pop(0))
-        pieces.append(builder.take(newest - lag_ns))
-    pieces.append(builder.take(finish=True))
-    return SprayPath.joined(pieces), builder.screen.counts
-
-
 def to_and_fro(times_s=TIMES_S):
     """Two passes there and back with the gun off at the turn."""
     t = times_s[:, np.newaxis]
@@ -54,7 +36,8 @@ def to_and_fro(times_s=TIMES_S):
 def test_batches_do_not_matter_to_the_last_bit(sizes, whole_strokes):
     trajectory = to_and_fro(TIMES_S[(TIMES_S < 1.0) | (TIMES_S > 1.4)])
     expected, counts = spray_path(trajectory, whole_strokes=whole_strokes)
-    path, streamed_counts = streamed(trajectory, sizes, whole_strokes)
+    pieces, streamed_counts = scenes.streamed(trajectory, sizes, whole_strokes)
+    path = SprayPath.joined(pieces)
     for column in fields(SprayPath):
         assert np.array_equal(getattr(path, column.name), getattr(expected, column.name))
     assert streamed_counts == counts
@@ -79,8 +62,7 @@ def test_the_trigger_cuts_within_a_segment_and_a_gap_is_gun_off():
 @pytest.mark.parametrize('whole_strokes', [False, True])
 def test_a_stream_that_begins_again_is_painted_again(whole_strokes):
     once = to_and_fro()
-    names = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
-    twice = Trajectory(*(np.concatenate(2 * [getattr(once, n)]) for n in names), **TRIGGER)
+    twice = scenes.rows_of(once, np.tile(np.arange(len(once)), 2))
     single, _ = spray_path(once)
     path, counts = spray_path(twice, whole_strokes=whole_strokes)
     assert (counts.restarts, counts.rejected, counts.gaps) == (1, 0, 0)

@@ -2,7 +2,6 @@
 
 import os
 import threading
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from paint_msgs.srv import SaveFilm
 from nodes.cell import offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.nodes.managed_node import ManagedNode
+from scenes import rows_of
 
 MOTION = two_passes()
 EVENTS = '/deposition_simulator/transition_event'
@@ -64,11 +64,7 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
     assert managed('activate') == (True, 'active')
     assert np.array_equal(node.film.snapshot().film_um, film)
     # The states count that came before.
-    second_pass = replace(
-        MOTION, stamps_ns=MOTION.stamps_ns[300:], positions_m=MOTION.positions_m[300:],
-        quaternions_xyzw=MOTION.quaternions_xyzw[300:],
-    )  # fmt: skip
-    assert np.array_equal(film, offline_um(node, second_pass))
+    assert np.array_equal(film, offline_um(node, rows_of(MOTION, slice(300, None))))
     assert managed('deactivate') == (True, 'inactive')
     assert managed('cleanup') == (True, 'unconfigured')
     wait_until(lambda: not source.pose_publisher.get_subscription_count())

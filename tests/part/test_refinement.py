@@ -5,11 +5,10 @@ import pytest
 from scipy.spatial import Delaunay
 from trimesh.creation import cylinder
 
-from paint_deposition.errors import MeshError
 from paint_deposition.part.edges import coarse_faces, matched_half_edges
 from paint_deposition.part.refinement import face_areas_m2, refine
 from paint_deposition.part.surface import Surface
-from surfaces import ball, flat, on_grid, triangulated
+from surfaces import ball, on_grid, triangulated
 
 
 @pytest.mark.parametrize('max_edge_length_m', [0.05, 0.02, 0.007])
@@ -71,11 +70,6 @@ def rim_length_m(vertices, faces):
     *_, single = matched_half_edges(faces)
     ends = vertices[np.roll(faces, -1, axis=1).ravel()[single]]
     return np.linalg.norm(vertices[faces.ravel()[single]] - ends, axis=1).sum()
-
-
-def test_too_many_triangles_are_refused_with_an_edge_length():
-    with pytest.raises(MeshError, match=r'max_edge_length_m = 0\.0001 m .* at least 0\.\d+ m'):
-        Surface.from_triangles(*triangulated(flat, 0.2), 1e-4)
 
 
 def test_a_picture_has_triangles_as_large_as_its_cells_and_joins_no_patches():

@@ -6,17 +6,13 @@ import sys
 import numpy as np
 import pytest
 
+from booth import SAMPLES
 from paint_deposition.files.meshes import read_mesh
 
 
 @pytest.fixture(scope='module')
-def samples(repository):
-    return repository / 'ros2_ws' / 'src' / 'paint_deposition' / 'samples'
-
-
-@pytest.fixture(scope='module')
-def door(samples):
-    return read_mesh(samples / 'door.stl')
+def door():
+    return read_mesh(SAMPLES / 'door.stl')
 
 
 def test_the_door_has_its_convex_line_and_its_concave_third(door):
@@ -38,10 +34,10 @@ def test_the_door_is_a_clean_sheet_that_stands(door):
 
 
 @pytest.mark.slow
-def test_the_script_draws_the_door_again(samples, tmp_path):
-    subprocess.run([sys.executable, samples / 'make_door.py', tmp_path], check=True)
+def test_the_script_draws_the_door_again(tmp_path):
+    subprocess.run([sys.executable, SAMPLES / 'make_door.py', tmp_path], check=True)
     for name in ('door.stl', 'panel.stl'):
         kept, drawn = (np.frombuffer((p / name).read_bytes()[84:], np.uint8) for p in
-                       (samples, tmp_path))  # fmt: skip
+                       (SAMPLES, tmp_path))  # fmt: skip
         assert len(kept) == len(drawn)
         assert np.mean(kept == drawn) > 0.99

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from trimesh.creation import box
+from trimesh.transformations import translation_matrix
 from trimesh.util import concatenate
 
 from paint_deposition.part.points import across_axis, downhill_axis
@@ -22,8 +23,8 @@ def test_all_of_an_open_surface_is_seen_wherever_it_is(offset_m):
 
 
 def test_the_shadow_of_a_bar_ends_where_geometry_says():
-    wall = box((1.0, 0.01, 1.0), transform=translation(y=0.005))
-    bar = box((2.0, 0.02, 0.1), transform=translation(y=-0.2))
+    wall = box((1.0, 0.01, 1.0), transform=translation_matrix([0.0, 0.005, 0.0]))
+    bar = box((2.0, 0.02, 0.1), transform=translation_matrix([0.0, -0.2, 0.0]))
     both = concatenate([wall, bar])
     surface = Surface.from_triangles(both.vertices, np.asarray(both.faces), 0.05)
     z = np.linspace(-0.4, 0.4, 801)
@@ -58,26 +59,6 @@ def test_sky_view_factor_in_a_groove(opening_deg, share):
     assert groove.at(point).sky_view_factor[0] == pytest.approx(1.0 - hidden, abs=0.02)
 
 
-def translation(y: float) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[1, 3] = y
-    return matrix
-
-
-@pytest.fixture(scope='module')
-def waves():
-    vertices, faces = triangulated(
-        lambda x, z: 0.05 * np.sin(20 * x) * np.cos(15 * z), 0.02, jitter=0.3
-    )
-    return Surface.from_triangles(vertices, faces, 0.05)
-
-
-@pytest.fixture
-def rays():
-    rng = np.random.default_rng(3)
-    return rng.uniform(-0.15, 0.15, (4000, 3)), rng.normal(size=(4000, 3))
-
-
 def crossings(surface, start, way):
     """Where a ray crosses the plane of each triangle, inf beside the triangle or behind."""
     a, b, c = surface.vertices_m[surface.faces].transpose(1, 0, 2)
@@ -88,8 +69,10 @@ def crossings(surface, start, way):
     )
 
 
-def test_the_first_of_all_triangles_that_a_ray_crosses(waves, rays):
-    starts, ways = (each[:300] for each in rays)
+def test_the_first_of_all_triangles_that_a_ray_crosses():
+    waves = refined(lambda x, z: 0.05 * np.sin(20 * x) * np.cos(15 * z), 0.02, 0.05, jitter=0.3)
+    rng = np.random.default_rng(3)
+    starts, ways = rng.uniform(-0.15, 0.15, (300, 3)), rng.normal(size=(300, 3))
     met = waves.first_faces(starts, ways)
     for start, way, face in zip(starts, ways, met, strict=True):
         along = crossings(waves, start, way)

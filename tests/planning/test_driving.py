@@ -1,6 +1,5 @@
 """Plans that a robot drives: its joints against the arm by the product of exponentials."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 import robot_arm
-from cli.command import paint
+from cli.command import figures_of, ran, told_in
 from paint_deposition.api.planning import read_robot
 from paint_deposition.errors import PaintError
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -23,7 +22,7 @@ from paint_deposition.planning.part_places import PartPlaces, part_places
 from paint_deposition.planning.plan import driven, plan
 from paint_deposition.planning.programme import Programme
 from paint_deposition.planning.requests import PlanRequest
-from scenes import painted
+from scenes import painted, rows_of
 from surfaces import sheet
 
 pytestmark = pytest.mark.slow
@@ -142,9 +141,7 @@ def test_a_turn_beside_the_passes_slows_itself_only(cell):
 
 def test_a_motion_that_is_slowed_down_has_no_gaps(planned, cell):
     """Poses 80 ms apart are nearly a second apart at a tenth of their speed."""
-    dense = planned.trajectory
-    columns = ('stamps_ns', 'positions_m', 'quaternions_xyzw')
-    few = replace(dense, **{name: getattr(dense, name)[::20] for name in columns})
+    few = rows_of(planned.trajectory, slice(None, None, 20))
     slow = replace(cell, arm=replace(cell.arm, fastest=0.05 * cell.arm.fastest))
     drive = slow.drive(few, free_roll=False)
     assert drive.limits
@@ -223,10 +220,9 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
     part = '--mesh', tmp_path / 'flat.stl', '--max-edge-length-m', 0.05
     robot = '--urdf', robot_arm.URDF, '--tip-link', 'tool0', '--part-pose', *PART_POSE
     asked = '--model', model, '--speed', 0.2, '--frame-id', 'cell'
-    done = paint('plan', *part, *asked, *robot, '-o', tmp_path / 'plan')
-    assert done.returncode == 0, done.stderr
+    done = ran('plan', *part, *asked, *robot, '-o', tmp_path / 'plan')
     assert 'driven as planned' in done.stdout
-    figures = json.loads((tmp_path / 'plan/plan.json').read_text())['robot']
+    figures = told_in(tmp_path / 'plan/plan.json')['robot']
     assert figures['joints'] == list(cell.arm.joints)
     table = np.loadtxt(tmp_path / 'plan/joints.csv', delimiter=',', skiprows=1)
     with AnyReader([tmp_path / 'plan/trajectory']) as bag:
@@ -237,12 +233,10 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
         ]
     np.testing.assert_allclose([p.positions for p in message.points], table[:, 1:], atol=1e-6)
     given = '--trajectory', tmp_path / 'plan/trajectory', *robot
-    done = paint('improve', *part, *given, '--model', model, '-o', tmp_path / 'better')
-    assert done.returncode == 0, done.stderr
+    ran('improve', *part, *given, '--model', model, '-o', tmp_path / 'better')
     assert (tmp_path / 'better/joints.csv').exists()
     better = pd.read_recording(tmp_path / 'better/trajectory', part_pose=PART_POSE)
     assert better.read_in == 'cell'
     grid = '--x', 0.9, 1.0, '--y', 0.0, 0.05
-    done = paint('place', *given, *grid, '-o', tmp_path / 'place', '--json')
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)['reached'] == [[1.0]]
+    places = figures_of('place', *given, *grid, '-o', tmp_path / 'place', '--json')
+    assert places['reached'] == [[1.0]]

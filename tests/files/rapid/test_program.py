@@ -20,15 +20,12 @@ def target(x, y=0.0, z=0.0, wxyz='1,0,0,0') -> str:
 
 
 @pytest.fixture
-def read(tmp_path):
+def read(file):
     """`read(body, data='', **options)`: the program of a module with this `main` and data."""
 
     def read(body: str, data: str = '', procedures: str = '', **options) -> rapid.RapidProgram:
-        path = tmp_path / 'test.mod'
-        path.write_text(
-            f'MODULE Test\n{data}\nPROC main()\n{body}\nENDPROC\n{procedures}\nENDMODULE\n'
-        )
-        return read_program(path, **options)
+        text = f'MODULE Test\n{data}\nPROC main()\n{body}\nENDPROC\n{procedures}\nENDMODULE\n'
+        return read_program(file('test.mod', text), **options)
 
     return read
 
@@ -122,11 +119,10 @@ def test_the_gun_is_one_of_several_outputs(read):
     assert 'never sets doFan; it sets: dogun dohorn' in refusal(read, body, gun_signal='doFan')
 
 
-def test_the_only_procedure_is_where_it_starts(tmp_path):
+def test_the_only_procedure_is_where_it_starts(file):
     """Functions and traps are none; modules of older controllers have letters of ISO-8859-1."""
-    path = tmp_path / 'a.mod'
-    path.write_text(
-        f'MODULE A ! Tür\nPROC Door()\nMoveL {target(1)},v600,fine,tBell;\nENDPROC\n'
+    path = file(
+        'a.mod', f'MODULE A ! Tür\nPROC Door()\nMoveL {target(1)},v600,fine,tBell;\nENDPROC\n'
         'FUNC num one()\nRETURN 1;\nENDFUNC\nTRAP t\nStop;\nENDTRAP\nENDMODULE\n', 'latin-1',
     )  # fmt: skip
     assert len(read_program(path).moves) == 1

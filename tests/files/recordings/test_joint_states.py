@@ -113,10 +113,9 @@ ONE_JOINT = (
         (ONE_JOINT.format(axis='0 0 1', speed='nan'), "velocity of joint 'j' is 'nan'; give a"),
     ],
 )
-def test_what_is_no_robot_is_refused(text, words, tmp_path):
-    (tmp_path / 'robot.urdf').write_text(text)
+def test_what_is_no_robot_is_refused(text, words, file):
     with pytest.raises(RecordingError, match=words):
-        _ = Robot.read(tmp_path / 'robot.urdf', tip='tool0').arm
+        _ = Robot.read(file('robot.urdf', text), tip='tool0').arm
 
 
 def test_joint_states_that_are_not_used_are_counted(tmp_path):

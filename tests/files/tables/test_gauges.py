@@ -42,11 +42,10 @@ CASES: dict[str, tuple[str, ...]] = {
 
 
 @pytest.fixture
-def points(tmp_path):
+def points(file):
     """A list of the four points."""
-    path = tmp_path / 'points.csv'
-    path.write_text('point,x_m,y_m,z_m\n' + ''.join(f'P{k},0.{k},0,0\n' for k in range(1, 5)))
-    return path
+    rows = ''.join(f'P{k},0.{k},0,0\n' for k in range(1, 5))
+    return file('points.csv', f'point,x_m,y_m,z_m\n{rows}')
 
 
 @pytest.mark.parametrize('name', CASES)

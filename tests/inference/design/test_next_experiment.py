@@ -33,21 +33,16 @@ def fit(study):
     return study.fit(FreeParameters.of(pd.DepositionModel()), starts=3)
 
 
-@pytest.fixture(scope='module')
-def drifting(study, fit):
-    """The panel as it reads where the air drifts."""
+@pytest.mark.slow
+def test_a_rolled_gun_tells_air_from_a_tool_and_places_lie_apart(study, fit):
+    """The air drifts in the booth, or the tool is off its point in its own frame."""
     (panel,) = study.campaign.experiments
-    drifting = fit.model.with_effect(EFFECTS['air_drift'](shift_down_m=0.03))
-    film_um = Forward(study.campaign, drifting.effects).predict_um(drifting)
+    acting = fit.model.with_effect(EFFECTS['air_drift'](shift_down_m=0.03))
+    film_um = Forward(study.campaign, acting.effects).predict_um(acting)
     noise_um = study.gauge_um * np.random.default_rng(2).normal(size=len(film_um))
     places_m = panel.measured_points.positions_m
     readings = pd.Readings.of(places_m, film_um + noise_um, sigma_um=study.gauge_um)
-    return Study.of(pd.Campaign((panel.with_readings(readings),)), drifting.effects)
-
-
-@pytest.mark.slow
-def test_a_rolled_gun_tells_air_from_a_tool_and_places_lie_apart(drifting, fit):
-    """The air drifts in the booth, or the tool is off its point in its own frame."""
+    drifting = Study.of(pd.Campaign((panel.with_readings(readings),)), acting.effects)
     found = drifting.fit(FreeParameters.of(fit.model))
     group = EffectClass(('air_drift', 'tcp_offset'), 0.9, 'air_drift')
     rivals = contenders_of(diagnosed(drifting, found, group), EFFECTS)
@@ -67,8 +62,7 @@ def test_a_rolled_gun_tells_air_from_a_tool_and_places_lie_apart(drifting, fit):
     assert f'{told["dwell_s"]:.1f} s' in spot.what
     assert told['peak_um'] <= drifting.measured_um.max()
     at = np.array([told['x_m'], told['y_m'], told['z_m']])
-    (panel,) = drifting.campaign.experiments
-    (row,) = np.flatnonzero((panel.measured_points.positions_m == at).all(axis=1))
+    (row,) = np.flatnonzero((places_m == at).all(axis=1))
     assert told['film_um'] == pytest.approx(drifting.measured_um[row])
     positions = np.array([place.position_m for place in places])
     at = panel.surface.at(positions)

@@ -31,15 +31,9 @@ def columns():
     return np.random.default_rng(4).normal(size=(READINGS, 3))
 
 
-@pytest.fixture
-def discrepancy(columns):
-    """A covariance of the discrepancy."""
-    return 2.0 * columns @ columns.T
-
-
-def test_the_null_model_has_the_covariance_of_all_that_varies(fit, columns, discrepancy):
+def test_the_null_model_has_the_covariance_of_all_that_varies(fit, columns):
     """It is the same where the discrepancy is given as columns; some readings have their part."""
-    plain = null_of(fit, columns)
+    plain, discrepancy = null_of(fit, columns), 2.0 * columns @ columns.T
     prior = fit.parameters.prior
     pattern = fit.jacobian @ prior.factor
     covariance = np.eye(READINGS) + pattern @ pattern.T + columns @ columns.T

@@ -36,11 +36,6 @@ def counts(information: dict) -> dict[str, int]:
     return {name: count for name, count in found.items() if name not in of_nodes}
 
 
-def offered(information: dict, topic: str) -> list[dict]:
-    topics = [entry['topic_metadata'] for entry in information['topics_with_message_count']]
-    return next(entry for entry in topics if entry['name'] == topic)['offered_qos_profiles']
-
-
 def messages(path) -> list[tuple[str, bytes]]:
     with open_bag(path) as bag:
         names = [topic.name for topic in bag.topics]

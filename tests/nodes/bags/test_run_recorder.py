@@ -62,8 +62,9 @@ def test_latched_messages_and_changed_parameters_are_recorded(record, start, cel
     wait_until(events.get_subscription_count, what='the subscription')
     assert planner.set_parameters(parameters(width_m=0.75))[0].successful
     wait_until(lambda: counts.get('/parameter_events', 0) >= 1, what='the event')
-    information = runs.finish(recorder)
-    (profile,) = runs.offered(information, '/thickness/stats')
+    entries = runs.finish(recorder)['topics_with_message_count']
+    told = (entry['topic_metadata'] for entry in entries)
+    (profile,) = next(t for t in told if t['name'] == '/thickness/stats')['offered_qos_profiles']
     assert profile['durability'] == 'transient_local'
     assert profile['reliability'] == 'reliable'
     data = dict(runs.messages(recorder.run.folder))['/thickness/stats']
