@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from scipy.cluster.vq import kmeans2
+from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
 from paint_deposition.effects.base import Effect
@@ -386,13 +387,15 @@ class Study:
 
 
 def _beside(columns: np.ndarray, misfit: np.ndarray) -> np.ndarray:
-    """(..., P) what directions (P, n), of unit variance, leave of a misfit over the noise.
+    """(P,) what directions (P, n), of unit variance, leave of a misfit over the noise.
 
     No level is taken to be further off than four standard deviations: the model is.
     """
-    precision = np.eye(columns.shape[1]) + columns.T @ columns
-    amplitudes = np.clip(misfit @ columns @ np.linalg.inv(precision), -4.0, 4.0)
-    return misfit - amplitudes @ columns.T
+    if not columns.size:
+        return misfit
+    weighted = np.vstack([columns, np.eye(columns.shape[1])])
+    wanted = np.append(misfit, np.zeros(columns.shape[1]))
+    return misfit - columns @ lsq_linear(weighted, wanted, (-4.0, 4.0)).x
 
 
 def _columns(effects: Sequence[RandomEffects], count: int) -> np.ndarray:
