@@ -64,7 +64,8 @@ class RunRecorder(ManagedNode):
             gun: (resolved(gun_topic(gun, POSES)), resolved(gun_topic(gun, STATES)))
             for gun in guns
         }
-        self._initial_messages = InitialMessages(motion, resolved(PART_POSE))
+        self._part_pose = resolved(PART_POSE)
+        self._initial_messages = InitialMessages(motion, self._part_pose)
         # Also while no run is recorded, since they stay in force.
         self._always_heard = {PARAMETER_EVENTS, *(states for _, states in motion.values())}
         self.recorded: dict[str, RecordedTopic] = {}
@@ -81,8 +82,9 @@ class RunRecorder(ManagedNode):
         new_run = self._create_run('', self._custom_data, keep_name=not self.runs)
         self._begin_run(new_run, time.time_ns())
         self.runs += 1
-        # Run and stamp of the part, as it was announced.
+        # Run and stamp of the part, as it was announced, and when.
         self._part: tuple[str, int] | None = None
+        self._announced_ns = 0
         self._refused: set[str] = set()
         # The run of the part that has left, while poses of it may come; until when, and by topic
         # when the last of its messages was sent. Those that came even later.
@@ -155,6 +157,8 @@ class RunRecorder(ManagedNode):
             return
         if name == self._part_topic:
             self._change_part(deserialize_message(cdr, Part), log_time_ns, sent_ns)
+        elif name == self._part_pose and sent_ns <= self._announced_ns:
+            return  # where the part before stood, which its run says already
         elif sent_ns <= self._left_ns.get(name, 0):
             self._guarded(self._write_late, name, cdr, log_time_ns, sent_ns)
             return
@@ -220,6 +224,7 @@ class RunRecorder(ManagedNode):
             self._drain()
             self._end_of_leaving()
             # Some messages were sent for this part, and are in the run before, too.
+            self._announced_ns = sent_ns
             self._left_ns, early = self._initial_messages.begin_part(part, sent_ns)
             counts = self.run.counts
             self.run.kept |= {name: counts[name] - count for name, count in early.items()}
