@@ -257,7 +257,7 @@ def test_levels_of_parts_are_told_beside_their_facets():
         parts.append(reading(part, level * part.readings.thickness_um))
     found, fit = cleaning.clean_and_fit(pd.Campaign(tuple(parts)), SMALL)
     assert np.abs(found.facet_um).max() > 3.0 * found.gauge_um.max()
-    by_name = {(a.kind, a.of): a for a in amounts(fit, found.random_effects)}
+    by_name = {(a.kind, a.of): a for a in amounts(*fit.amplitudes, found.random_effects)}
     for name, level in (('thick', 3.0), ('thin', -3.0)):
         amount = by_name['part level', name]
         assert amount.value == pytest.approx(level, abs=3.0 * amount.sd)

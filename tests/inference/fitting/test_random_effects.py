@@ -31,7 +31,7 @@ def estimated(study, change_um: np.ndarray) -> dict:
     nothing = np.zeros((len(study), len(PATTERN)))
     fit = fit_linear(nothing, change_um / study.sigma_um)
     fit = replace(fit, nuisance=study.nuisance)
-    return {(a.kind, a.of): a for a in amounts(fit, study.random_effects)}
+    return {(a.kind, a.of): a for a in amounts(*fit.amplitudes, study.random_effects)}
 
 
 def test_a_level_and_a_zero_come_back_with_their_uncertainty():

@@ -210,7 +210,7 @@ class Diagnosis:
     @cached_property
     def random_effects(self) -> tuple[Amount, ...]:
         """Estimated levels of parts and zeros of gauge sessions."""
-        return amounts(self.history[-1].fit, self.study.random_effects)
+        return amounts(*self.history[-1].fit.amplitudes, self.study.random_effects)
 
     @property
     def left_out(self) -> str:

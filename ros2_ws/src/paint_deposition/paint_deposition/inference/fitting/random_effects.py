@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
 
-from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.readings.campaign import Campaign
 
 # Parts painted alike differ in their mean film by about this share: 4 % was found for clearcoat
@@ -108,13 +107,15 @@ def _parts(campaign: Campaign) -> tuple[np.ndarray, np.ndarray]:
     return campaign.experiment_of[:, np.newaxis] == np.arange(len(off)), off
 
 
-def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
-    """Estimates of the random effects beside a fit, the model being linear around it.
+def amounts(
+    mean: np.ndarray, covariance: np.ndarray, effects: tuple[RandomEffects, ...]
+) -> tuple[Amount, ...]:
+    """Estimates of the random effects.
 
     Args:
-        fit: whose first nuisance directions are those of the random effects.
+        mean, covariance: (n,) and (n, n) of the amplitudes of nuisance directions, the first of
+            which are those of the random effects; see ``Fit.amplitudes``.
     """
-    mean, covariance = fit.amplitudes
     found, first = [], 0
     for kind in effects:
         count = len(kind.names)

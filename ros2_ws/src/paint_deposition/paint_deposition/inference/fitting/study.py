@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import groupby
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.random_effects import (
     RandomEffects,
+    amounts,
     levels_untold,
     random_effects,
 )
@@ -33,8 +36,6 @@ FOLDS = 6
 # The film's own variation from spot to spot, which no model predicts and repeats do not average
 # out, as a standard deviation over the film: assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
-
-
 # Parts and gauge sessions that differ so improbably are no usual ones.
 UNUSUAL = 0.02
 
@@ -231,26 +232,22 @@ class Study:
             return 1.0, ''
         misfit = (self.measured_um - predicted_um) / self.sigma_um
         # Amplitudes of unit variance, and the share of it that the readings tell.
-        precision = np.eye(columns.shape[1]) + columns.T @ columns
-        mean = np.linalg.solve(precision, columns.T @ misfit)
-        known = np.eye(columns.shape[1]) - np.linalg.inv(precision)
-        shares, ways = np.linalg.eigh(known)
+        covariance = np.linalg.inv(np.eye(columns.shape[1]) + columns.T @ columns)
+        mean = covariance @ (columns.T @ misfit)
+        shares, ways = np.linalg.eigh(np.eye(len(mean)) - covariance)
         seen = shares > 0.5
         square = float(np.sum((ways[:, seen].T @ mean) ** 2 / shares[seen]))
         p_value = float(chi2.sf(square, np.count_nonzero(seen)))
         if p_value > UNUSUAL:
             return p_value, ''
-        first, levels = 0, []
-        for each in effects:
-            values = each.mixing @ mean[first : first + len(each.names)]
-            first += len(each.names)
-            told = ', '.join(
-                f'{name} {value:+.1f} {each.unit}'
-                for name, value in zip(each.names, values, strict=True)
-            )
-            steps = np.diff(values)
+        levels = []
+        estimated = amounts(mean, covariance, effects)
+        for kind, of_kind in groupby(estimated, key=attrgetter('kind')):
+            found = [*of_kind]
+            told = ', '.join(f'{one.of} {one.value:+.1f} {one.unit}' for one in found)
+            steps = np.diff([one.value for one in found])
             way = ', rising' if (steps > 0.0).all() else ', falling' if (steps < 0.0).all() else ''
-            levels.append(f'{each.kind}s {told}{way}')
+            levels.append(f'{kind}s {told}{way}')
         return p_value, (
             f'Beside the model the parts differ by more than usual parts do (p = {p_value:.2g}): '
             f'{"; ".join(levels)}. Check flow, booth and gauge from part to part.'
