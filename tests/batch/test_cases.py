@@ -22,7 +22,7 @@ from paint_deposition.errors import BatchError
 
 pytestmark = pytest.mark.slow
 TOLD = {'mesh': 'panel.stl', 'trajectory': 'panel_577', 'max_edge_length_m': 0.1}
-CASES = 200
+CASES = 80
 FILM = "{'mean_um': [20.0]}"
 
 

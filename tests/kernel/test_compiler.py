@@ -10,17 +10,24 @@ import pytest
 
 from paint_deposition.kernel.compiler import KINDS, kinds_at_hand, njit
 
-# Writes a film to the standard output.
+# Writes a film on a wall before the gun to the standard output.
 FILM = """
 import sys
+import numpy as np
 import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.part.points import SurfacePoints
 
-samples = pd.sample_folder()
-door = pd.read_mesh(samples / 'door.stl', max_edge_length_m=0.02)
-motion = pd.read_recording(samples / 'door_horizontal', state_topic='/atomizer/state')
+motion = pd.read_recording(pd.sample_folder() / 'door_horizontal', state_topic='/atomizer/state')
+x, z = np.meshgrid(np.linspace(-0.5, 0.5, 60), np.linspace(-0.4, 0.4, 50))
+wall = np.stack([x.ravel(), 0.0 * x.ravel(), z.ravel()], axis=1)
+points = SurfacePoints(wall, np.tile([0.0, -1.0, 0.0], (len(wall), 1)))
 model = pd.DepositionModel().with_effect(EFFECTS['standoff_efficiency'].typical())
-sys.stdout.buffer.write(pd.simulate(door, motion, model).film_um.tobytes())
+film_um = FilmIntegrator(points, model).raw_of(spray_path(motion)[0])
+assert film_um.max() > 10.0
+sys.stdout.buffer.write(film_um.tobytes())
 """
 
 

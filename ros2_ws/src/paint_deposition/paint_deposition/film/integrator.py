@@ -5,6 +5,7 @@ come in. The film is the same to the last bit.
 """
 
 import copy
+import math
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -172,7 +173,7 @@ class FilmIntegrator:
         for effect in self._effects:
             path = effect.on_path(path, self._context)
         rows = np.flatnonzero(path.flow * path.dwell_s)
-        return path.select(rows), rows
+        return path if len(rows) == len(path) else path.select(rows), rows
 
     def _steps(self, path: SprayPath, reach: float | None = None) -> Steps:
         """What the kernel reads; ``reach`` of lines of sight, if it is not the pattern's."""
@@ -201,8 +202,8 @@ class FilmIntegrator:
         # (S, 3) origins from which to trace, and (M,) the row of them that holds.
         places_m = [] if self._traced_from is None else [self._traced_from]
         tracing = np.empty(len(origins_m), dtype=np.int64)
-        for step, origin in enumerate(origins_m):
-            if not places_m or np.linalg.norm(origin - places_m[-1]) > layout.SIGHT_STEP_M:
+        for step, origin in enumerate(origins_m.tolist()):
+            if not places_m or math.dist(origin, places_m[-1]) > layout.SIGHT_STEP_M:
                 places_m.append(origin)
             tracing[step] = len(places_m) - 1
         traced, blocks = np.reshape(places_m, (-1, 3)), self._blocks

@@ -95,6 +95,7 @@ class _Part:
     def __init__(self, experiment: Experiment, in_kernel: dict[str, Effect]) -> None:
         self.experiment, self._in_kernel = experiment, in_kernel
         self._integrators: dict[bool, FilmIntegrator] = {}
+        self._paths = [experiment.path.select(rows) for _, rows in experiment.films]
         # Films and prepared paths depend on less than the model: many models share one.
         self._film_um = lru_cache(8)(self._integrated_um)
         self._steps = lru_cache(2)(self._prepared)
@@ -167,6 +168,6 @@ class _Part:
 
     def _prepared(self, slope: bool, *_: object) -> list[Steps]:
         """The path of each wet film as the integrator's effects have it."""
-        integrator, path = self._integrators[slope], self.experiment.path
+        integrator = self._integrators[slope]
         integrator.reset()
-        return [integrator.steps(path.select(rows)) for _, rows in self.experiment.films]
+        return [integrator.steps(path) for path in self._paths]
