@@ -63,13 +63,15 @@ def test_a_hidden_shift_has_the_amount_that_a_judge_expects(truth_id, drawn, shi
 def test_every_hidden_effect_changes_the_readings_of_a_door():
     pattern, (job,) = draw_jobs(5, [], ('door',), gun='near_edge')
     x, z = scatter(job.part, 200, np.random.default_rng(1), 0.015)
-    _, clean = Bench(9, job, pattern, 100_000).readings([], x, z)
+    usual = Bench(9, job, pattern, 100_000)
+    clean = usual.readings([], x, z)[1]
     for name, truth in library().items():
         hidden = truth.draw(np.random.default_rng(2), truth.most if np.isfinite(truth.most) else 1)
-        part = hidden.on_part(job.part)
-        bench = Bench(9, Job(job.name, part, job.plan, job.motion), pattern, 100_000)
-        before = clean if part is job.part else bench.readings([], x, z)[1]
-        _, shown = bench.readings([hidden], x, z)
+        part, bench, before = hidden.on_part(job.part), usual, clean
+        if part is not job.part:
+            bench = Bench(9, Job(job.name, part, job.plan, job.motion), pattern, 100_000)
+            before = bench.readings([], x, z)[1]
+        shown = bench.readings([hidden], x, z)[1]
         assert np.abs(shown - before).max() > 0.5, name
 
 
