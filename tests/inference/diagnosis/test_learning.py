@@ -187,14 +187,14 @@ def test_the_unexplained_is_told_by_its_place_its_size_and_the_part_that_it_bega
     assert unknown.share > 0.1
     assert unknown.p_value < 0.05
     assert set(unknown.curve) == {unknown.covariate, 'residual_um'}
-    assert 'more than the model says, since panel 2; it shows most against' in str(unknown)
+    assert 'more than the model says, since panel 2; it shows most with' in str(unknown)
     assert str(unknown).startswith('At the upper third')
     assert f' of {unknown.part} there is' in str(unknown)
     assert unknown.part in unknown.parts
     # On all parts it has no beginning; where no place stands out only the condition is told.
     on_all = replace(unknown, parts=('panel 1', *unknown.parts), since='', mean_residual_um=-6.0)
-    assert 'model says; it shows on panel 1, panel 2, panel 3, most against' in str(on_all)
+    assert 'model says; it shows on panel 1, panel 2, panel 3, most with' in str(on_all)
     assert 'most' not in str(replace(on_all, p_value=0.3))
     nowhere = replace(unknown, parts=(), part='', where='no single place stands out')
-    shows = f'It shows most against {unknown.covariate}; no single place stands out.'
+    shows = f'It shows most with {unknown.covariate}; no single place stands out.'
     assert str(nowhere) == shows

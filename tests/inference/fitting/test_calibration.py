@@ -155,9 +155,9 @@ def in_unit(panel, factor, rows=slice(None)):
         (lambda panel: in_unit(panel, 25.4), 'look like mil, say unit: {thickness: mil}'),
         (lambda panel: in_unit(panel, 1000.0), 'look like mm, say unit: {thickness: mm}'),
         (lambda panel: in_unit(panel, 25.4, SIX),
-         r"6 of the readings in 'thickness_um'.* look like mil, multiply them by 25\.4 or"),
+         r"6 of the readings in 'thickness_um'.* look like mil: multiply them by 25\.4 or"),
         (lambda panel: in_unit(panel, 1000.0, SIX),
-         '6 of the readings.* look like mm, multiply them by 1000'),
+         '6 of the readings.* look like mm: multiply them by 1000'),
     ],
     ids=['few', 'one side', 'even', 'negative', 'mils', 'mm', 'six in mils', 'six in mm'],
 )  # fmt: skip

@@ -110,7 +110,7 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
     found = result.discrepancy
     if found and found.footprint_of_peak and not result.is_incomplete:
         yield (
-            'the footprint differs from two Gaussians by '
+            'the footprint differs from eq. (1) by '
             f'{100.0 * found.footprint_of_peak:.0f} % of its peak; '
             'paint refit CAMPAIGN --add learned:footprint learns it'
         )
@@ -271,7 +271,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[s
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
     if diagnosis.p_value < 1.0:
-        yield f'p-value if nothing is missing: {diagnosis.p_value:.4f}'
+        yield f'p-value, nothing missing: {diagnosis.p_value:.4f}'
     for effects in diagnosis.classes:
         label = how if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
@@ -302,8 +302,8 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[s
         yield f'{len(regions) - MISFITS} weaker misfits{when} are in diagnosis.json'
     if diagnosis.calibrate_first:
         yield (
-            'next: paint calibrate a flat panel, and diagnose with its model: a pattern that is '
-            'known cannot stand for an effect'
+            'next: calibrate on a flat panel, then diagnose with that model: a known pattern '
+            'cannot mimic an effect'
         )
     for spray in diagnosis.proposals[1][:2]:
         todo = f'next: spray {spray.what}, and measure {spray.readings} points'

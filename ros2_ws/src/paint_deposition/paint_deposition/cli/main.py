@@ -19,7 +19,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 # an example, as it runs in the folder of the samples. Modules are only loaded when their command
 # is used, so that help comes at once.
 COMMANDS = {
-    'demo': ('samples', 'A first film, and what readings make of it, on one page.',
+    'demo': ('samples', 'Paint, diagnose and improve a sample door, on one page.',
         '-o my_demo'),
     'simulate': ('simulate', 'Film on a part from a recorded trajectory.',
         '--mesh door.stl --trajectory door_horizontal --trigger /atomizer/state -o film'),

@@ -49,7 +49,7 @@ class FiniteRange(click.FloatRange):
 
 
 class File(click.Path):
-    """A path that is not empty, as that of a variable of the shell which is not set."""
+    """A path that is not empty, as an unset variable of the shell would give."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == '':

@@ -51,8 +51,8 @@ def recommend_command(
     if answer.index_drift_m and answer.standoff_drift_m:
         index, standoff = answer.index_drift_m, answer.standoff_drift_m
         lines.append(
-            f'the index may drift to {1e3 * index[0]:.0f} and {1e3 * index[1]:.0f} mm, the '
-            f'standoff by {standoff[0] * 1e3:+.0f} and {standoff[1] * 1e3:+.0f} mm'
+            f'permitted drift: index from {1e3 * index[0]:.0f} to {1e3 * index[1]:.0f} mm, '
+            f'standoff by {standoff[0] * 1e3:+.0f} to {standoff[1] * 1e3:+.0f} mm'
         )
     lines += (f'note: {note}' for note in answer.notes)
     results.print(lines, of_model)

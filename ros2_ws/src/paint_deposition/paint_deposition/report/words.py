@@ -70,11 +70,11 @@ def competing_explanations(spray: Spray) -> str:
 def separation_words(spray: Spray) -> str:
     """What a spray does for the leading effect: its distance from the next, and the chance."""
     words = (
-        f'it tells {competing_explanations(spray)} apart: the most probable one will be '
-        f'{spray.separation:.1f} standard deviations from the next, now {spray.now:.1f}'
+        f'it tells {competing_explanations(spray)} apart: {spray.separation:.1f} standard '
+        f'deviations between the two most probable, now {spray.now:.1f}'
     )
     if spray.chance == spray.chance:
-        words += f', and one effect is left with a probability of {percent(spray.chance)}'
+        words += f'; with a probability of {percent(spray.chance)} only one effect remains'
         words += ': it hardly helps' if spray.chance < 0.05 else ''
     return '; '.join(filter(None, [words, spray.film_words]))
 

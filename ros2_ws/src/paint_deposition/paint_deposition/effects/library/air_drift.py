@@ -6,7 +6,7 @@ from paint_deposition.effects.base import Effect, PathContext, SprayPath, parame
 
 
 class AirDrift(Effect):
-    """Slow drops are advected by the booth's air, and sink.
+    """Slow drops drift with the booth's air, and sink.
 
     Acts on the motion: the pattern is shifted on the model plane by the drift's components in the
     tool's x and y. On the part the shift is a Z / Omega, Z the distance along the bell's axis, as

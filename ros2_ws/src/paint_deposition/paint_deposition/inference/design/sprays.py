@@ -183,9 +183,9 @@ MENU = (
         'roll_90', 'with the gun rolled 90 deg about its axis', _on_path(_rolled, 90.0), 'roll'
     ),
     Change('reverse_order', 'in reverse order', _on_path(_other_order), 'order'),
-    Change('other_way', 'each run the other way', _on_path(_other_way), 'way'),
-    Change('further', '60 mm further off', partial(_moved_off, distance_m=0.06), 'standoff'),
-    Change('closer', '60 mm closer', partial(_moved_off, distance_m=-0.06), 'standoff'),
+    Change('other_way', 'with every pass reversed', _on_path(_other_way), 'way'),
+    Change('further', 'with 60 mm more standoff', partial(_moved_off, distance_m=0.06), 'standoff'),
+    Change('closer', 'with 60 mm less standoff', partial(_moved_off, distance_m=-0.06), 'standoff'),
     Change('half_flow', 'at half the flow', _on_path(SprayPath.with_flow_scaled, 0.5), 'film'),
     Change('double_flow', 'at twice the flow', _on_path(SprayPath.with_flow_scaled, 2.0), 'film'),
     Change('half_speed', 'at half the speed', _on_path(_at_speed, 0.5), 'film'),
@@ -194,9 +194,9 @@ MENU = (
         'longer_open', 'with the gun opened 0.3 s earlier and closed 0.3 s later',
         _on_path(_open_longer), 'trigger',
     ),
-    Change('turned', 'turned by 90 deg together with the gun', _passes_turned, 'passes', 2.0),
+    Change('turned', 'with path and gun turned by 90 deg', _passes_turned, 'passes', 2.0),
     Change(
-        'upside_down', 'with the part hung upside down and the passes turned with it',
+        'upside_down', 'with part and passes turned upside down',
         _upside_down, 'part', 2.0,
     ),
     Change(

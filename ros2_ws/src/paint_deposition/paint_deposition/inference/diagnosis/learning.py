@@ -192,17 +192,14 @@ class LeftOut:
         unaware = LeftOut(nothing, [SearchStage(nothing, [])], nothing, ())
         squares_um2 = np.zeros(len(folds))
         for out in (folds == fold for fold in np.unique(folds)):
-            if nothing is not self.final and not self._finds_something(~out):
-                squares_um2[out] = unaware.errors_um(rows=out)[0] ** 2
-                continue
+            if nothing is not self.final:
+                p_values = nothing.space.select(~out).p_values(nothing.state.seed)
+                if min(p_values) >= ALPHA:
+                    squares_um2[out] = unaware.errors_um(rows=out)[0] ** 2
+                    continue
             count = self.borne_out(laws, without, ~out)
             squares_um2[out] = self.errors_um(without, rows=out)[count] ** 2
         return float(np.sqrt(np.mean(squares_um2)))
-
-    def _finds_something(self, kept: np.ndarray) -> bool:
-        """Whether the test with some readings (P,) says that something is missing."""
-        nothing = self.nothing
-        return min(nothing.space.select(kept).p_values(nothing.state.seed)) < ALPHA
 
     def _predicted(self, without: frozenset[str], out: np.ndarray) -> np.ndarray:
         """(n, P) films with 0 to n - 1 laws, found without some readings (P,) [um]."""

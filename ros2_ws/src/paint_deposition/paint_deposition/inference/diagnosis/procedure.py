@@ -109,14 +109,14 @@ def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) 
     )
     if share > MOST_BEYOND or state.accepted:
         unknown = locate_unexplained(state.study, first.fit, nothing, state.seed)
-        reason = 'The footprint differs from the two Gaussians of eq. (1); it was learned.'
+        reason = 'The footprint differs from that of eq. (1); it was learned.'
         if share > MOST_BEYOND:
             reason = f'{beyond}; the limit is {100.0 * MOST_BEYOND:.0f} %. {unknown}'
         return state.diagnosis(p_value, 'unknown_effect', reason, (), unknown)
-    reason = f'{beyond}: sprays of one setting usually differ by as much.'
+    reason = f'{beyond}: sprays of one setting may differ by as much.'
     # Errors this many times as large as the noise of gauge and texture need a word.
     if first.rmse_um < 1.1 * noise_um:
-        reason = 'The readings agree with the model to within the noise of the gauge.'
+        reason = 'The readings agree with the model to within gauge and texture.'
     p_of_levels, doubt = state.study.level_doubt(first.fit.predicted_um)
     if doubt:
         reason = f'{doubt} Beside it: {reason[0].lower()}{reason[1:]}'
@@ -197,7 +197,7 @@ def _conclude(
     for over in (c.best.removeprefix('learned:') for c in state.accepted):
         alike = [n for n, shapes in state.candidates.items() if over in shapes[0].covariates]
         if alike:
-            reason += f' What depends on {over}, too, with another law: {", ".join(alike)}.'
+            reason += f' Effects that depend on it with another law: {", ".join(alike)}.'
     if len(set(best.usual.setting_of)) == 1:
         reason += (
             ' All parts were painted alike: it may belong to the part or to the spray. Spray '
@@ -225,4 +225,4 @@ def _others(state: DiagnosisState, probabilities: Mapping[str, float]) -> tuple[
 def _in_words(found: EffectClass) -> str:
     if len(found.members) == 1:
         return found.best
-    return f'{found.best} (or what they cannot tell from it: {", ".join(found.members[1:])})'
+    return f'{found.best} (or, not distinguishable here, {", ".join(found.members[1:])})'

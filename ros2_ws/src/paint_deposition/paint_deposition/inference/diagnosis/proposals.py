@@ -106,9 +106,9 @@ class StationarySpray:
         """The spray, and the film there now and then."""
         place = ', '.join(f'{value:.3f}' for value in self.position_m)
         return (
-            f'one spot for {self.dwell_s:.1f} s, the gun standing square to the part '
-            f'{1e3 * self.standoff_m:.0f} mm before ({place}) m, where {self.film_um:.0f} µm were '
-            f'measured and {self.peak_um:.0f} µm will be the most'
+            f'one spot for {self.dwell_s:.1f} s with the gun still, square to the part, its TCP '
+            f'{1e3 * self.standoff_m:.0f} mm from ({place}) m; film there now '
+            f'{self.film_um:.0f} µm, peak afterwards {self.peak_um:.0f} µm'
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -62,7 +62,7 @@ class Unknown:
     share: float
 
     def __str__(self) -> str:
-        against = f'most against {self.covariate}' if self.p_value < ALPHA else ''
+        against = f'most with {self.covariate}' if self.p_value < ALPHA else ''
         if not self.part:
             words = f'it shows {against}; {self.where}.' if against else f'{self.where}.'
             return words[0].upper() + words[1:]
@@ -72,7 +72,7 @@ class Unknown:
             since, on = f', since {self.since}', ''
         shows = ', '.join(filter(None, [on, against]))
         return (
-            f'At the {self.where.partition(", ")[0]} of {self.part} there is '
+            f'On {self.part}, {self.where.partition(", ")[0]}, there is '
             f'{abs(self.mean_residual_um):.1f} µm ({100.0 * abs(self.share):.0f} %) {more} than '
             f'the model says{since}{"; it shows " if shows else ""}{shows}.'
         )
@@ -126,7 +126,7 @@ class Diagnosis:
         classes: accepted ones in that order, then others by probability.
         history: the models, base first.
         unknown: where the unexplained shows, or None.
-        not_testable: ids that these readings cannot see at typical size.
+        not_testable: ids that these readings cannot see at any physical size.
         detectable: smallest amplitude of each testable effect that would have been seen.
         library: the effects that were looked for, by id.
         remarks: on what was known before, a sentence each.
@@ -199,7 +199,7 @@ class Diagnosis:
     def calibrate_first(self) -> bool:
         """Whether it is open what is missing, and no panel has shown the pattern alone.
 
-        A pattern that is known cannot stand for an effect.
+        A known pattern cannot mimic an effect.
         """
         is_open = self.verdict in ('undecided', 'unknown_effect') or any(
             len(found.members) > 1 for found in self.classes if found.best in self.accepted

@@ -190,10 +190,10 @@ class DiscrepancyFigures:
 
     def __str__(self) -> str:
         setting, peak = 100.0 * self.setting_share, 100.0 * self.footprint_of_peak
-        parts = f', parts painted alike by {100.0 * self.part_share:.1f} %'
-        footprint = f'; the footprint differs from two Gaussians by {peak:.0f} % of its peak'
+        parts = f', {100.0 * self.part_share:.1f} % between parts painted alike'
+        footprint = f'; the footprint differs from eq. (1) by {peak:.0f} % of its peak'
         return (
-            f'No law is exact: the film of a setting may be off by {setting:.1f} % of its peak'
-            f'{parts if self.part_share else ""}, alike over about {1e3 * self.length_m:.0f} mm, '
-            f'as usual sprays and these readings say{footprint if peak else ""}.'
+            f'Model discrepancy, from usual sprays and these readings: {setting:.1f} % of the '
+            f'thickest film for a setting{parts if self.part_share else ""}, correlated over '
+            f'about {1e3 * self.length_m:.0f} mm{footprint if peak else ""}.'
         )

@@ -213,16 +213,16 @@ def find_mistakes(study: Study, fit: Fit, start: DepositionModel) -> tuple[Mista
 def _sentence(way: Meant, given: Weighed, meant: Weighed) -> str:
     if way.kind in PLACES:
         off = (one.study.residuals(one.fit.predicted_um).rmse_um for one in (given, meant))
-        why = 'a model is off them by {:.3g} µm, and by {:.3g} µm if it is so'.format(*off)
+        why = 'the fitted model is off by {:.3g} µm, corrected by {:.3g} µm'.format(*off)
     elif way.of_this_gun:
         sizes = (
             f'{one.study.measured_um.mean():.3g} µm and K1 = {_k1(one.fit.model):.3g} cm³/s'
             for one in (given, meant)
         )
-        why = 'they mean a film of {}, else of {}'.format(*sizes)
+        why = 'as given they mean a film of {}, corrected of {}'.format(*sizes)
     else:
         ratio = _k1(given.fit.model) / _k1(given.start)
-        why = f'the readings say {ratio:.2g} times its K1'
+        why = f'the K1 of the readings is {ratio:.2g} times its own'
     return f'{way.finding}: {why}; {way.remedy}'
 
 
@@ -297,8 +297,8 @@ def _mirrored(campaign: Campaign, some: Sequence[int]) -> Iterator[Meant]:
             alone = len(some) == 1
             middle = f'the part at ({x:.3f}, {y:.3f}, {z:.3f}) m' if alone else 'each part'
             remedy = (
-                'take the positions or the mesh of the hand that was measured: these fit the '
-                f'other one, about the middle of {middle}'
+                'take positions and mesh of the same hand, left or right: these fit when mirrored '
+                f'about the middle of {middle}'
             )
             yield Meant('mirrored', named, remedy, _with_parts(campaign, changed))
 

@@ -249,7 +249,7 @@ class Study:
             way = ', rising' if (steps > 0.0).all() else ', falling' if (steps < 0.0).all() else ''
             levels.append(f'{kind}s {told}{way}')
         return p_value, (
-            f'Beside the model the parts differ by more than usual parts do (p = {p_value:.2g}): '
+            f'The levels of the parts differ by more than usual (p = {p_value:.2g}): '
             f'{"; ".join(levels)}. Check flow, booth and gauge from part to part.'
         )
 

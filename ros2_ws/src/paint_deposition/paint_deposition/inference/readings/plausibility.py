@@ -87,8 +87,8 @@ def _other_unit(
 ) -> ReadingsError:
     return ReadingsError(
         f"{readings.source}: {len(strange)} of the readings in '{readings.heading}' are about "
-        f'{np.median(strange):.3g} where {np.median(others_um):.3g} µm is expected; they look '
-        f'like {unit}, multiply them by {UNITS[unit]:g} or, if all are, say unit: '
+        f'{np.median(strange):.3g}, against {np.median(others_um):.3g} µm otherwise; they look '
+        f'like {unit}: multiply them by {UNITS[unit]:g} or, if all are {unit}, say unit: '
         f'{{thickness: {unit}}} in the campaign'
     )
 
