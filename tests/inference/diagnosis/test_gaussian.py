@@ -5,8 +5,8 @@ from functools import partial
 
 import numpy as np
 import pytest
-from scipy.integrate import dblquad
-from scipy.stats import f, kstest, multivariate_t, norm
+from scipy.integrate import dblquad, quad
+from scipy.stats import f, kstest, multivariate_normal, multivariate_t, norm
 
 from booth import MODEL
 from inference.diagnosis.linear import KNOWN, PARAMETERS, fit_linear, linear_fit, null_of
@@ -76,17 +76,40 @@ def test_simulated_deviations_are_as_wide_as_the_noise_is_uncertain():
     assert np.std(gaussian.simulated(50, np.inf, 400, seed=3)) == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_parameter_that_a_bound_has_stopped_is_no_direction(fit):
-    """The fit would go on if it could: what it leaves is a deviation, not the pattern's."""
-    _, high = fit.parameters.bounds
-    last = len(fit.vector) - 1
-    stopped = replace(fit, vector=np.where(np.arange(last + 1) == last, high, fit.vector))
+@pytest.mark.parametrize('beyond', [0.5, 1.0, 3.0])
+def test_evidence_at_a_bound_is_the_integral_over_what_is_physical(fit, beyond):
+    """Of readings that ask for K2 below zero by so many of its standard deviations."""
+    prior, k2, rest = fit.parameters.prior, 1, [0, *range(2, 7)]
+    covariance, jacobian = prior.factor @ prior.factor.T, fit.jacobian
+    fitted = np.linalg.inv(jacobian.T @ jacobian + prior.whitening.T @ prior.whitening)
+    wanted = -beyond * np.sqrt(fitted[k2, k2])
+    data = jacobian @ fit.vector + fit.residual
+    data = data + jacobian[:, k2] * (wanted - fit.vector[k2]) / (1.0 - fitted[k2, k2])
+
+    def given(value: float) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and covariance of the others, K2 having a value."""
+        slope = covariance[rest, k2] / covariance[k2, k2]
+        spread = covariance[np.ix_(rest, rest)] - np.outer(slope, covariance[k2, rest])
+        return prior.centre[rest] + slope * (value - prior.centre[k2]), spread
+
+    def density(value: float) -> float:
+        mean, spread = given(value)
+        expected = jacobian[:, rest] @ mean + jacobian[:, k2] * value
+        shape = np.eye(READINGS) + jacobian[:, rest] @ spread @ jacobian[:, rest].T
+        likelihood = multivariate_normal(expected, shape).logpdf(data)
+        density_of_k2 = norm(prior.centre[k2], prior.width[k2]).pdf(value)
+        return float(np.exp(likelihood + 0.5 * READINGS * np.log(2.0 * np.pi)) * density_of_k2)
+
+    (mean, spread), vector = given(0.0), np.zeros(7)
+    part, left = jacobian[:, rest], data - jacobian[:, rest] @ mean
+    gain = spread @ part.T @ np.linalg.inv(np.eye(READINGS) + part @ spread @ part.T)
+    vector[rest] = mean + gain @ left
+    stopped = replace(fit, vector=vector, residual=data - jacobian @ vector)
     null = null_of(stopped)
-    rest, prior = slice(0, last), fit.parameters.prior
-    columns = fit.jacobian[:, rest] @ prior.factor[rest, rest]
-    assert null.columns == pytest.approx(columns)
-    away = (stopped.vector - prior.centre)[rest]
-    assert null.scaled_deviation == pytest.approx(fit.residual + fit.jacobian[:, rest] @ away)
+    found = null.log_evidence(null.deviation[:, np.newaxis], np.inf)[0]
+    integral, _ = quad(density, 0.0, 20.0 * np.sqrt(fitted[k2, k2]))
+    assert found == pytest.approx(np.log(integral), abs=1e-4)
+    assert null.columns.shape[1] == len(rest)
 
 
 @pytest.mark.parametrize('freedom', [np.inf, 6.0])

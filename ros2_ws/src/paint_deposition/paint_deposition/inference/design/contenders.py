@@ -100,7 +100,7 @@ class Contender:
         if not self.is_effect:
             return evidence + LOG_PRIOR[self.name]
         prior = log_odds(PRIOR_EFFECT) + float(np.log(self.share))
-        return evidence + gain_of_sizes(self.fit, [self.name]) + prior
+        return evidence + gain_of_sizes(self.fit, [self.name], freedom) + prior
 
 
 def _laws_of(fit: Fit) -> frozenset[str]:
@@ -145,7 +145,7 @@ def contenders_of(
     for name in names:
         effect = fit.model.effect(name) or space.central.by_law(name)[1]
         rough = fitted(effect, discrepancy=best.null.discrepancy)
-        sizes = best_amplitude_sizes(rough, [name])
+        sizes = best_amplitude_sizes(rough, [name], freedom)
         there = fitted(effect, discrepancy=best.null.discrepancy, sizes=sizes)
         weights, ways = [], []
         for k, (errors, share) in enumerate(ways_off(study, there, _laws_of(there), usual.model)):

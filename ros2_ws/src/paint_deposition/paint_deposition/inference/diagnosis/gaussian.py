@@ -15,6 +15,10 @@ from scipy.special import log_ndtr
 
 from paint_deposition.inference.fitting.least_squares import Fit, covariance_factor
 
+# Of q parameters at bounds: (P, q) change of the readings over the noise for a step inward, the
+# others following; (q,) slope and precision of their prior there, and its log density.
+AtBounds = tuple[np.ndarray, np.ndarray, np.ndarray, float]
+
 
 @dataclass(frozen=True)
 class NullModel:
@@ -29,15 +33,19 @@ class NullModel:
     discrepancy: np.ndarray | None
     lower: np.ndarray  # (P, P) Cholesky factor of the deviations' covariance
     deviation: np.ndarray  # (P,) whitened deviations; standard normal if nothing is missing
+    held: AtBounds | None  # parameters that the fit has driven to bounds of physics, if any
 
     @staticmethod
     def of(
-        columns: np.ndarray, scaled_deviation: np.ndarray, discrepancy: np.ndarray | None = None
+        columns: np.ndarray,
+        scaled_deviation: np.ndarray,
+        discrepancy: np.ndarray | None = None,
+        held: AtBounds | None = None,
     ) -> 'NullModel':
-        """From directions (P, m), deviations (P,) and what is left over."""
+        """From directions (P, m), deviations (P,), what is left over, and what is held."""
         lower = covariance_factor(columns, discrepancy)
         deviation = solve_triangular(lower, scaled_deviation, lower=True, check_finite=False)
-        return NullModel(columns, scaled_deviation, discrepancy, lower, deviation)
+        return NullModel(columns, scaled_deviation, discrepancy, lower, deviation, held)
 
     @staticmethod
     def around(
@@ -51,25 +59,38 @@ class NullModel:
             nuisance: directions that carry no meaning.
             discrepancy: (P, P) covariance of the discrepancy.
         """
-        prior = fit.parameters.prior
+        prior, jacobian = fit.parameters.prior, fit.jacobian
+        away, covariance = fit.vector - prior.centre, prior.factor @ prior.factor.T
         # What the fit has driven to a bound of physics does not go on beyond it.
-        ends = np.isclose(fit.vector, fit.parameters.bounds, rtol=0.0, atol=1e-6)
-        free = ~ends.any(axis=0)
-        raw = fit.residual + fit.jacobian[:, free] @ (fit.vector - prior.centre)[free]
-        directions = fit.jacobian[:, free] @ prior.factor[np.ix_(free, free)]
-        return NullModel.of(np.hstack([directions, nuisance]), raw, discrepancy)
+        low, high = np.isclose(fit.vector, fit.parameters.bounds, rtol=0.0, atol=1e-6)
+        free, held = ~(low | high), None
+        if not free.all():
+            ends = ~free
+            inward = np.where(low, 1.0, -1.0)[ends]
+            precision = np.linalg.inv(covariance[np.ix_(ends, ends)])
+            # The others are then as they are given what is held.
+            by_held = covariance[np.ix_(free, ends)] @ precision
+            moved = inward * (jacobian[:, ends] + jacobian[:, free] @ by_held)
+            pull, log_det = precision @ away[ends], np.linalg.slogdet(precision / (2.0 * np.pi))[1]
+            log_density = 0.5 * (log_det - away[ends] @ pull)
+            held = (moved, inward * pull, np.diag(precision), float(log_density))
+            away = away[free] - by_held @ away[ends]
+            covariance = covariance[np.ix_(free, free)] - by_held @ covariance[np.ix_(ends, free)]
+        raw = fit.residual + jacobian[:, free] @ away
+        directions = jacobian[:, free] @ np.linalg.cholesky(covariance)
+        return NullModel.of(np.hstack([directions, nuisance]), raw, discrepancy, held)
 
     def beside(self, more: np.ndarray) -> 'NullModel':
         """The null hypothesis with some more directions (P, n), if any, that may vary."""
         if not more.size:
             return self
         return NullModel.of(
-            np.hstack([self.columns, more]), self.scaled_deviation, self.discrepancy
+            np.hstack([self.columns, more]), self.scaled_deviation, self.discrepancy, self.held
         )
 
     def with_discrepancy(self, discrepancy: np.ndarray) -> 'NullModel':
         """The null hypothesis with another covariance (P, P) of the discrepancy."""
-        return NullModel.of(self.columns, self.scaled_deviation, discrepancy)
+        return NullModel.of(self.columns, self.scaled_deviation, discrepancy, self.held)
 
     def log_evidence(self, deviations: np.ndarray, freedom: float) -> np.ndarray:
         """(D,) log likelihood of whitened deviations (P, D), the noise's scale integrated out.
@@ -77,14 +98,28 @@ class NullModel:
         Args:
             deviations: of the readings, or simulated. freedom: of the noise estimate.
         """
-        half_log_det = np.log(np.diag(self.lower)).sum()
+        constant = self.log_inward - np.log(np.diag(self.lower)).sum()
         squares = np.sum(deviations**2, axis=0)
         if not np.isfinite(freedom):
-            return -0.5 * squares - half_log_det
-        return (
-            -0.5 * (freedom + len(self.scaled_deviation)) * np.log1p(squares / freedom)
-            - half_log_det
-        )
+            return constant - 0.5 * squares
+        count = freedom + len(self.scaled_deviation)
+        return constant - 0.5 * count * np.log1p(squares / freedom)
+
+    @cached_property
+    def log_inward(self) -> float:
+        """What the evidence has from parameters at bounds: the integral from there inward.
+
+        Each of several by itself. Along one the density falls as exp(-a t - b t^2 / 2): it does
+        not rise, since the fit would not have stayed there.
+        """
+        if self.held is None:
+            return 0.0
+        columns, pull, precision, log_density = self.held
+        shown = self.whiten(columns)
+        root = np.sqrt(precision + np.sum(shown**2, axis=0))
+        slope = np.maximum(pull - shown.T @ self.deviation, 0.0) / root
+        integral = 0.5 * np.log(2.0 * np.pi) - np.log(root) + 0.5 * slope**2 + log_ndtr(-slope)
+        return log_density + float(integral.sum())
 
     def first(self, count: int) -> 'NullModel':
         """The same for the first so many of the readings; nothing is factored anew."""
@@ -95,6 +130,7 @@ class NullModel:
             None if discrepancy is None else discrepancy[:count, :count],
             self.lower[:count, :count],
             self.deviation[:count],
+            self._held_at(slice(count)),
         )
 
     def predicted(self, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -113,7 +149,11 @@ class NullModel:
     def select(self, rows: np.ndarray) -> 'NullModel':
         """The null hypothesis for some of the readings."""
         kept = None if self.discrepancy is None else self.discrepancy[np.ix_(rows, rows)]
-        return NullModel.of(self.columns[rows], self.scaled_deviation[rows], kept)
+        held = self._held_at(rows)
+        return NullModel.of(self.columns[rows], self.scaled_deviation[rows], kept, held)
+
+    def _held_at(self, rows: np.ndarray | slice) -> AtBounds | None:
+        return None if self.held is None else (self.held[0][rows], *self.held[1:])
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ enough to test whether anything is missing, and to propose what.
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -358,31 +359,36 @@ def space_around(study: Study, fit: Fit, explanations: Sequence[Explanation] = (
     return ModelSpace(weighed, explanations, discrepancy, freedom)
 
 
-def best_amplitude_sizes(fit: Fit, names: Iterable[str]) -> dict[str, float]:
+def best_amplitude_sizes(fit: Fit, names: Iterable[str], freedom: float) -> dict[str, float]:
     """The most probable size of each effect's amplitudes, times their typical ones.
 
     With the typical size an effect that is stronger would be drawn towards none.
     """
-    return {name: float(SIZES[_by_size(fit, name).argmax()]) for name in names}
+    return {name: float(SIZES[_by_size(fit, name, freedom).argmax()]) for name in names}
 
 
-def gain_of_sizes(fit: Fit, names: Iterable[str]) -> float:
-    """What it adds to a fit's log evidence that the amplitudes of effects have any of the sizes.
+def gain_of_sizes(fit: Fit, names: Iterable[str], freedom: float) -> float:
+    """Log evidence of a fit averaged over ``SIZES`` of the amplitudes, minus that at the fitted.
 
-    The fit takes each as normal with one size as the standard deviation.
+    Each effect by itself. The fit takes its amplitudes as normal with one size as the standard
+    deviation.
     """
-    each = [np.logaddexp.reduce(_by_size(fit, name)) for name in names]
-    return float(np.sum(each)) - len(each) * float(np.log(len(SIZES)))
+    gain = 0.0
+    for name in names:
+        sized, fitted = _by_size(fit, name, freedom), fit.parameters.amplitude_sizes.get(name, 1.0)
+        gain += float(np.logaddexp.reduce(sized) - sized[np.searchsorted(SIZES, fitted)])
+    return gain - len([*names]) * float(np.log(len(SIZES)))
 
 
-def _by_size(fit: Fit, name: str) -> np.ndarray:
-    """(S,) log odds of each size of an effect's amplitudes against that of the fit."""
-    entries, fitted = fit.parameters.of_effects, fit.parameters.amplitude_sizes.get(name, 1.0)
-    amounts = fit.vector[len(fit.vector) - len(entries) :]
-    own = [amount for amount, entry in zip(amounts, entries, strict=True)
-           if entry.effect == name and not entry.is_shape]  # fmt: skip
-    change = 0.5 * np.sum(np.square(own)) * (fitted**-2.0 - SIZES**-2.0)
-    return change - len(own) * np.log(SIZES / fitted)
+def _by_size(fit: Fit, name: str, freedom: float) -> np.ndarray:
+    """(S,) log evidence of a fit if the amplitudes of one of its effects had each of the sizes."""
+    found = []
+    for size in SIZES:
+        sizes = {**fit.parameters.amplitude_sizes, name: float(size)}
+        sized = replace(fit, parameters=replace(fit.parameters, amplitude_sizes=sizes))
+        null = NullModel.around(sized, fit.nuisance, fit.discrepancy)
+        found.append(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
+    return np.array(found)
 
 
 def inclusion_of(log_weights: Sequence[float], others: Sequence[float]) -> float:

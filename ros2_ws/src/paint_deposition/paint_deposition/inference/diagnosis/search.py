@@ -137,7 +137,11 @@ class EffectSet:
         The fit takes each as normal with one size as the standard deviation.
         """
         nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
-        return float(np.logaddexp.reduce(nature)) + gain_of_sizes(self.fit, self.names)
+        return float(np.logaddexp.reduce(nature)) + self._gain_of_sizes
+
+    @cached_property
+    def _gain_of_sizes(self) -> float:
+        return gain_of_sizes(self.fit, self.names, self.state.freedom)
 
     @property
     def log_prior(self) -> float:
@@ -169,7 +173,7 @@ class EffectSet:
         there = [one for one in self.weighed if one.sizes == self.best.sizes]
         weights = [one.select(rows, self.state.freedom).log_weight for one in there]
         evidence = float(np.logaddexp.reduce(weights))
-        return evidence + gain_of_sizes(self.fit, self.names) + self.log_prior
+        return evidence + self._gain_of_sizes + self.log_prior
 
 
 @dataclass(frozen=True)
@@ -234,7 +238,7 @@ class Search:
             [*effects.values()], model, discrepancy=discrepancy, others=others
         )
         trial = replace(start, names=frozenset(effects), fit=fit)
-        sizes = best_amplitude_sizes(fit, effects)
+        sizes = best_amplitude_sizes(fit, effects, self.state.freedom)
         if any(size != 1.0 for size in sizes.values()):
             fit = self.state.fitted_with(
                 [*trial.effects.values()],
