@@ -53,7 +53,7 @@ Diagnosis = figures(
                 holdout_rmse_um=dict[str, Number])
     ],
     rmse_um=figures(
-        'before after holdout_before holdout_after noise_floor',
+        'before after holdout_before holdout_after holdout_after_refitted noise_floor',
         left_out=Literal['experiments', 'points'],
     ),
     experiments=list[figures('rmse_before_um rmse_after_um', name=str)],

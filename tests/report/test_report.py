@@ -148,7 +148,7 @@ def test_the_cost_is_what_the_pattern_cannot_imitate(report, diagnosis, comparis
     without, with_it = (step.fit.predicted_um for step in diagnosis.history)
     rms = np.sqrt(np.mean((with_it - without) ** 2))
     text = Page(report).text
-    assert f'the prediction differs by {rms:.2f} µm RMS at the points' in text
+    assert f'the prediction changes by {rms:.2f} µm RMS over the points' in text
     # The drift alone moves more paint: the fitted pattern takes up a part of it.
     fitted = diagnosis.history[-1].model
     alone = diagnosis.study.forward.predict_um(fitted.model_copy(update={'effects': ()}))
@@ -183,10 +183,10 @@ def test_every_verdict_has_its_report(tell, diagnosis, comparisons, which):
     words, verdict, changes = (
         ('agrees with the readings', 'none_missing', base),
         ('cannot be trusted', 'fit_broken', base | broken),
-        ('do not say which', 'undecided', base | {'classes': (drift, fog)}),
+        ('do not say what', 'undecided', base | {'classes': (drift, fog)}),
         ('Something more is, most likely fog gradient (or TCP tilt) (40 %).', 'undecided',
          {'classes': (diagnosis.classes[0], fog)}),
-        ('no known effect explains', 'unknown_effect', {}),
+        ('No known effect explains', 'unknown_effect', {}),
     )[which]  # fmt: skip
     other = replace(diagnosis, verdict=verdict, **changes)
     page = Page(tell(other, comparisons[: len(other.history)]))

@@ -70,7 +70,7 @@ def test_a_rolled_gun_tells_air_from_a_tool_and_places_lie_apart(study, fit):
     assert (at.edge_distance_m > next_experiment.EDGE_MARGIN_M).all()
     apart = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2)
     assert (apart + np.eye(len(places)) > next_experiment.SPACING_M).all()
-    assert 'air_drift' in places[0].why
+    assert places[0].why.startswith(('separates air_drift', 'separates tcp_offset'))
     told = places[0].to_dict()
     assert [told[axis] for axis in ('x_m', 'y_m', 'z_m')] == positions[0].tolist()
     assert (told['experiment'], told['why']) == (places[0].experiment, places[0].why)
@@ -116,7 +116,7 @@ def test_done_twice_changes_nothing(study, key):
 
 
 def diagnosed(study, fit, *classes: EffectClass, accepted=(), unknown=None) -> Diagnosis:
-    step = Step('', fit, 1.0, 1.0)
+    step = Step('', fit, 1.0, 1.0, 1.0)
     return Diagnosis(study, 'undecided', '', 0.01, accepted, classes, (step,), unknown)
 
 

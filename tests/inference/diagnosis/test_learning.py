@@ -76,7 +76,7 @@ def test_what_no_law_explains_is_learned_without_the_parts_left_out(monkeypatch)
     nothing = Search(begun(rising)).nothing
     over_time = [law for law in nothing.state.nonparametric_laws if law.learns == 'time_s']
     left_out = learning.LeftOut(nothing, [SearchStage(nothing, [])], nothing, over_time)
-    without, *with_laws = left_out.errors_um()
+    without, *with_laws = left_out.errors_by_count_um()
     noise_um = nothing.state.study.noise_floor_um
     assert without > 1.7 * noise_um
     assert with_laws[0] < 1.3 * noise_um
@@ -85,8 +85,8 @@ def test_what_no_law_explains_is_learned_without_the_parts_left_out(monkeypatch)
     assert with_laws[1] == with_laws[0]
     law = [(over_time[0], 1.0)]
     assert left_out.borne_out(law) == 1
-    assert left_out.error_um(law) == pytest.approx(with_laws[0])
-    kept_out = left_out.errors_um(frozenset(['time_s']))
+    assert left_out.errors_um(law)[0] == pytest.approx(with_laws[0])
+    kept_out = left_out.errors_by_count_um(frozenset(['time_s']))
     assert kept_out == pytest.approx([without] * (1 + learning.MOST_LAWS))
     anew = []
     for part in rising.experiments:
@@ -98,7 +98,7 @@ def test_what_no_law_explains_is_learned_without_the_parts_left_out(monkeypatch)
     monkeypatch.setattr(ModelSpace, 'p_values', lambda self, seed: (1.0, 1.0))
     stages, found = [SearchStage(nothing, [])], replace(nothing)
     unaware = learning.LeftOut(nothing, stages, found, over_time)
-    assert unaware.error_um(law) == pytest.approx(without)
+    assert unaware.errors_um(law)[0] == pytest.approx(without)
 
 
 @pytest.mark.slow
@@ -111,14 +111,14 @@ def test_a_law_that_improves_one_part_only_is_not_chosen_by_that_part():
     films_um[1, study.folds() == 0] += 0.9
 
     class Given(learning.LeftOut):
-        def errors_um(self, without=frozenset(), of='parts', rows=slice(None)):
+        def errors_by_count_um(self, without=frozenset(), of='parts', rows=slice(None)):
             return np.sqrt(np.mean((study.measured_um - films_um)[:, rows] ** 2, axis=1))
 
     given = Given(nothing, [SearchStage(nothing, [])], nothing, [])
     law = [(WAVY, 1.0)]
-    assert given.errors_um()[1] < 0.9
+    assert given.errors_by_count_um()[1] < 0.9
     assert given.borne_out(law) == 1
-    assert given.error_um(law) == pytest.approx(np.sqrt((1.0 + 2.0 * 1.02**2) / 3.0))
+    assert given.errors_um(law)[0] == pytest.approx(np.sqrt((1.0 + 2.0 * 1.02**2) / 3.0))
 
 
 @pytest.mark.slow
@@ -134,9 +134,9 @@ def test_a_map_is_borne_out_by_points_within_a_spot_that_a_patch_takes_out_as_a_
     study = nothing.state.study
     maps = [*of_places(study, nothing.fit.model)]
     left_out = learning.LeftOut(nothing, [SearchStage(nothing, [])], nothing, maps)
-    without, by_patches, _ = left_out.errors_um()
+    without, by_patches, _ = left_out.errors_by_count_um()
     assert by_patches == pytest.approx(without, rel=0.02)
-    without, by_points, _ = left_out.errors_um(of='place')
+    without, by_points, _ = left_out.errors_by_count_um(of='place')
     assert by_points < 0.75 * without
     assert left_out.borne_out([(left_out.options[0], 1.0)]) == 1
     high_m = [np.ptp(places_m[study.scattered() == k, 2]) for k in range(6)]
@@ -165,8 +165,10 @@ def test_a_fold_that_calls_for_another_set_goes_no_further(monkeypatch):
             lambda out, fits=fits: study.predicted_without_um(fits[folds[out][0]], out)
         )
         left_out = learning.LeftOut(first, stages, final, [])
-        assert left_out.errors_um() == pytest.approx([expected] * (1 + learning.MOST_LAWS))
-        assert left_out.error_um() == pytest.approx(expected)
+        assert left_out.errors_by_count_um() == pytest.approx(
+            [expected] * (1 + learning.MOST_LAWS)
+        )
+        assert left_out.errors_um()[0] == pytest.approx(expected)
 
 
 @pytest.mark.slow
@@ -188,8 +190,7 @@ def test_the_unexplained_is_told_by_its_place_its_size_and_the_part_that_it_bega
     assert unknown.p_value < 0.05
     assert set(unknown.curve) == {unknown.covariate, 'residual_um'}
     assert 'more than the model says, since panel 2; it shows most with' in str(unknown)
-    assert str(unknown).startswith('At the upper third')
-    assert f' of {unknown.part} there is' in str(unknown)
+    assert str(unknown).startswith(f'On {unknown.part}, upper third')
     assert unknown.part in unknown.parts
     # On all parts it has no beginning; where no place stands out only the condition is told.
     on_all = replace(unknown, parts=('panel 1', *unknown.parts), since='', mean_residual_um=-6.0)

@@ -224,7 +224,7 @@ def test_the_deviation_of_the_footprint_is_told(plain, discrepancy):
     assert figures.profile.found - figures.profile.eq1 == pytest.approx(0.2, abs=0.02)
     assert 0.0 < figures.profile.sd < 0.02
     assert figures.length_m == discrepancy.lengths_m[SMALL.length]
-    assert 'the footprint differs from two Gaussians by 20 % of its peak' in str(figures)
+    assert 'the footprint differs from eq. (1) by 20 % of its peak' in str(figures)
     assert 'parts painted alike' not in str(figures)
     # What does not show is not spoken of: a law that is learned may show it all the same.
     assert 'footprint' not in str(replace(figures, footprint_of_peak=0.0))

@@ -1,5 +1,7 @@
 """The fit: the vector that it varies, a known pattern, and uncertainties as wide as they are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -69,19 +71,23 @@ def test_derivatives_are_those_of_the_prediction(forward, exact):
 
 
 @pytest.mark.slow
-def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact):
+@pytest.mark.parametrize('size', [0.0, 2.0], ids=['noise', 'and a field that the fit ignores'])
+def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact, size):
     random = np.random.default_rng(4)
+    waves = size * np.sin(np.outer(np.linspace(0.0, 6.0, len(exact)), [1.0, 2.0, 3.0]))
     parameters = FreeParameters.of(TRUTH)
     sigma = np.full(len(exact), SIGMA_UM)
     vectors = []
     for _ in range(25):
-        measured = exact + SIGMA_UM * random.normal(size=len(exact))
+        noise = random.normal(size=len(exact)) + waves @ random.normal(size=3)
+        measured = exact + SIGMA_UM * noise
         vectors.append(fit_readings(forward, measured, sigma, parameters).vector)
     reference = fit_readings(forward, exact, sigma, parameters)
-    # With fixed truth the estimates scatter by C J'J C, a little less than C for the priors.
-    covariance = scaled_covariance(reference)
-    information = reference.jacobian.T @ reference.jacobian
-    expected = np.sqrt(np.diag(covariance @ information @ covariance))
+    # With fixed truth the estimates scatter a little less, as it is not drawn from the priors.
+    field = waves @ waves.T
+    covariance = scaled_covariance(replace(reference, discrepancy=field if size else None))
+    gain = scaled_covariance(reference) @ reference.jacobian.T
+    expected = np.sqrt(np.diag(gain @ (np.eye(len(exact)) + field) @ gain.T))
     # The standard error of a deviation from 25 draws is 14 %.
     assert np.std(vectors, axis=0, ddof=1) / expected == pytest.approx(np.ones(7), abs=0.45)
     assert (np.sqrt(np.diag(covariance)) >= expected).all()

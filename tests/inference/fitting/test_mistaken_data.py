@@ -150,7 +150,7 @@ def test_parts_whose_level_falls_by_more_than_usual_are_told():
     found = pd.diagnose(falling)
     assert found.verdict == 'unknown_effect'
     assert found.p_value < 0.02
-    assert found.reason.startswith('Beside the model the parts differ by more than usual')
+    assert found.reason.startswith('The levels of the parts differ by more than usual')
     assert found.warnings == ()
 
 
@@ -194,7 +194,7 @@ def test_a_calibration_warns_of_the_unit_and_of_targets_far_away(panels):
         zones = told.at(part.surface.vertices_m, part.surface.normals)
         parts.append(replace(scaled(part, 10.0), zones=zones))
     unit, rim, rest, *_ = pd.calibrate(of(*parts)).warnings
-    assert unit.startswith('the readings look ten times too large: they mean a film of ')
+    assert unit.startswith('the readings look ten times too large: as given they mean a film of ')
     assert unit.endswith('; divide them by 10')
     # Then all else that readings and targets are warned of.
     assert "panel 1: no reading is in zone 'rim' (20 µm), the nearest is 0.100 m off" in rim

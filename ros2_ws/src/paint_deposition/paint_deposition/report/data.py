@@ -256,7 +256,7 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     fitted: tuple[Estimate, ...] = ()
     if data.diagnosis:
         fit = data.diagnosis.history[-1].fit
-        fitted = estimates(fit.marginal, with_mean_level(fit, data.study.campaign))
+        fitted = estimates(fit, with_mean_level(fit, data.study.campaign))
     found = {estimate.name: estimate for estimate in fitted}
     brushes, rows = data.model.brushes, []
     of = [f'brush {brush.number}: ' if len(brushes) > 1 else '' for brush in brushes] or ['']

@@ -93,7 +93,7 @@ def _write_diagnosis(
     for file, steps in zip(models, (result.history[:1], result.history), strict=True):
         fit = steps[-1].fit
         off = with_mean_level(fit, result.study.campaign)
-        known = result.posterior_at(steps[-1]), estimates(fit.marginal, off)
+        known = result.posterior_at(steps[-1]), estimates(fit, off)
         write_fitted(file, result.study, steps, *known, start)
     data = ReportData(result, start.history)
     return models + _write_results(folder, 'diagnosis.json', result.to_dict(), data, pictures)

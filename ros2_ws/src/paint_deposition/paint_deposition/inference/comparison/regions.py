@@ -55,7 +55,7 @@ def misfit_regions(study: Study, points: Residuals, model: DepositionModel) -> l
             best = int(np.argmax(np.abs(scores)))
             if abs(scores[best]) < threshold:
                 break
-            members = places[best] > 0.0
+            members = (places[best] > 0.0) & (left != 0.0)
             region = rows[members]
             readings = int(study.campaign.readings.repeats[region].sum())
             mean = float(np.mean(points.residual_um[region]))

@@ -5,7 +5,7 @@ and kept only if they improve the prediction of readings left out.
 """
 
 from collections.abc import Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -140,7 +140,7 @@ class LeftOut:
         }
         self._known: dict[tuple[frozenset[str], str], np.ndarray] = {}
 
-    def errors_um(
+    def errors_by_count_um(
         self,
         without: frozenset[str] = frozenset(),
         of: str = 'parts',
@@ -172,18 +172,20 @@ class LeftOut:
         single points.
         """
         kept, enough = 0, 1.0 - LEAST_GAIN
-        parts_um = self.errors_um(without, rows=rows)
+        parts_um = self.errors_by_count_um(without, rows=rows)
         for count, (law, _) in enumerate(laws, start=1):
             better = parts_um[count] <= enough * parts_um[kept]
             if law.learns in (PLACE, FOOTPRINT) and parts_um[count] <= 1.001 * parts_um[kept]:
-                within_um = self.errors_um(without, law.learns, rows)
+                within_um = self.errors_by_count_um(without, law.learns, rows)
                 better |= within_um[count] <= enough * within_um[kept]
             if better:
                 kept = count
         return kept
 
-    def error_um(self, laws: Sequence[Sized] = (), without: frozenset[str] = frozenset()) -> float:
-        """On each part left out with what the other parts lead to [um].
+    def errors_um(
+        self, laws: Sequence[Sized] = (), without: frozenset[str] = frozenset()
+    ) -> tuple[float, float]:
+        """On parts left out with what the others lead to, and as with ``keeping_effects`` [um].
 
         With as many of some laws as they bear out; with nothing at all where their test finds
         nothing, but something was found with all parts.
@@ -195,11 +197,20 @@ class LeftOut:
             if nothing is not self.final:
                 p_values = nothing.space.select(~out).p_values(nothing.state.seed)
                 if min(p_values) >= ALPHA:
-                    squares_um2[out] = unaware.errors_um(rows=out)[0] ** 2
+                    squares_um2[out] = unaware.errors_by_count_um(rows=out)[0] ** 2
                     continue
             count = self.borne_out(laws, without, ~out)
-            squares_um2[out] = self.errors_um(without, rows=out)[count] ** 2
-        return float(np.sqrt(np.mean(squares_um2)))
+            squares_um2[out] = self.errors_by_count_um(without, rows=out)[count] ** 2
+        error_um = float(np.sqrt(np.mean(squares_um2)))
+        keeping = self.keeping_effects
+        return error_um, error_um if keeping is self else keeping.errors_um(laws, without)[0]
+
+    @cached_property
+    def keeping_effects(self) -> 'LeftOut':
+        """The same if every fold keeps the effects found with all readings, and refits them."""
+        final = self.final
+        kept = self.nothing is final
+        return self if kept else LeftOut(final, [SearchStage(final, [])], final, self.options)
 
     def _predicted(self, without: frozenset[str], out: np.ndarray) -> np.ndarray:
         """(n, P) films with 0 to n - 1 laws, found without some readings (P,) [um]."""
@@ -253,10 +264,14 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     order = np.argsort(values)
     points = order[np.linspace(0, len(order) - 1, 15).astype(int)]
     regions = misfit_regions(study, residuals, fit.model)
-    names = [experiment.name for experiment in study.campaign.experiments]
-    shown = [name for name in names if name in {region.experiment for region in regions}]
-    # The strongest contrast is the place to look at: what is widest may only balance it.
+    # The strongest contrast is the place to look at: what is widest, or off the other way, may
+    # only balance it.
     first = max(regions, key=lambda region: abs(region.mean_residual_um), default=None)
+    alike = {
+        one.experiment for one in regions if one.mean_residual_um * first.mean_residual_um > 0.0
+    }
+    names = [experiment.name for experiment in study.campaign.experiments]
+    shown = [name for name in names if name in alike]
     mean_um = float(np.mean(study.measured_um[first.rows])) if first else np.nan
     return Unknown(
         covariate,

@@ -10,7 +10,7 @@
 5. Conclude what is missing, or between what it is undecided, or where the unexplained shows.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +34,9 @@ from paint_deposition.inference.diagnosis.proposals import testability
 from paint_deposition.inference.diagnosis.search import EffectSet, Group, Search, SearchStage
 from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
+from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
+from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
@@ -52,6 +54,7 @@ def diagnose(
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
     known: Posterior | None = None,
+    sound: frozenset[str] = frozenset(),
 ) -> Diagnosis:
     """Find what is missing from a model.
 
@@ -62,9 +65,10 @@ def diagnose(
         seed: of starts and simulated deviations.
         progress: called with a line for each step of the work.
         known: what an earlier job told of the start's parameters: the prior.
+        sound: labels of points whose readings are no outliers.
     """
     progress('fitting the model')
-    state = DiagnosisState.begin(campaign, start, library, seed, known)
+    state = DiagnosisState.begin(campaign, start, library, seed, known, sound)
     if trouble := trouble_with(state.study, state.fit):
         return state.diagnosis(np.nan, 'fit_broken', trouble)
     progress('computing the evidence of what may be missing')
@@ -89,10 +93,29 @@ def diagnose(
     ]
     left_out = LeftOut(nothing, stages, best, options)
     state = replace(state, figures=best.space.figures, discrepancy=best.best.null.discrepancy)
-    state = _accept(state, fit, groups, left_out.error_um())
+    state = _accept(state, fit, groups, left_out.errors_um())
     progress('learning what the laws leave unexplained')
     state = _learn(state, best, left_out)
+    explained = _explained_outliers(campaign, state.study.outliers, state.fit.model)
+    if explained and not sound:
+        progress('readings that looked wrong agree with what was found: diagnosing with them')
+        return diagnose(campaign, start, library, seed, progress, known, explained)
     return _conclude(state, best, _others(state, search.beside(best, sought)), p_value)
+
+
+def _explained_outliers(
+    campaign: Campaign, outliers: Iterable[Outlier], model: DepositionModel
+) -> frozenset[str]:
+    """Labels of outliers that a model explains: by more than half, and to within their scatter."""
+    readings = campaign.readings
+    labels = readings.point[readings.first].tolist()
+    film_um = dict(zip(labels, Forward(campaign, model.effects).predict_um(model), strict=True))
+    return frozenset(
+        one.point
+        for one in outliers
+        if abs(one.thickness_um - film_um.get(one.point, np.inf))
+        < min(3.0 * one.sigma_um, 0.5 * abs(one.thickness_um - one.expected_um))
+    )
 
 
 def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) -> Diagnosis:
@@ -125,7 +148,7 @@ def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) 
 
 
 def _accept(
-    state: DiagnosisState, final: Fit, groups: dict[str, Group], holdout_um: float
+    state: DiagnosisState, final: Fit, groups: dict[str, Group], holdout_um: tuple[float, float]
 ) -> DiagnosisState:
     """Accept the effects of a fit, strongest first, each as a step of the history."""
     effects = {effect.id: effect for effect in state.candidates_in(final)}
@@ -172,8 +195,8 @@ def _learn(state: DiagnosisState, best: EffectSet, left_out: LeftOut) -> Diagnos
     learned = [
         e.id for e in fit.model.effects if e.family == 'learned' and e not in state.start.effects
     ]
-    before, error_um = state.history[-1], left_out.error_um(laws, without)
-    state = state.with_step(' and '.join(learned), fit, error_um)
+    before = state.history[-1]
+    state = state.with_step(' and '.join(learned), fit, left_out.errors_um(laws, without))
     for law in learned:
         state = state.accepting((law,), 1.0, before)
     return state
@@ -188,12 +211,16 @@ def _conclude(
         names = ', and '.join(_in_words(c) for c in named)
         return state.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
     possible = ', or '.join(f'{c.best} ({percent(c.probability)})' for c in others[:3])
+    unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
     # Where a law was learned something unknown acts, whatever may act beside it.
-    if not state.accepted and sum(c.probability for c in others) >= 0.5:
+    enough = 0.5 if unknown.part or unknown.p_value < ALPHA else 0.1
+    if not state.accepted and sum(c.probability for c in others) >= enough:
         reason = f'These may be missing: {possible}'
         return state.diagnosis(p_value, 'undecided', reason, others)
-    unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
-    reason = f'Something outside the library acts. {unknown}'
+    reason = f'Something is missing that no effect of the library explains. {unknown}'
+    p_of_levels, doubt = state.study.level_doubt(state.fit.predicted_um)
+    if doubt and p_of_levels < p_value:
+        reason = f'{doubt} {reason}'
     for over in (c.best.removeprefix('learned:') for c in state.accepted):
         alike = [n for n, shapes in state.candidates.items() if over in shapes[0].covariates]
         if alike:

@@ -120,7 +120,8 @@ def _with_learned(
         explanation, size = _best(options, others)
         return state.study.predicted_without_um(state.fit, out, size * explanation.columns)
 
-    state = state.with_step(law.id, fit, float(state.study.errors_left_out_um(without)))
+    error_um = float(state.study.errors_left_out_um(without))
+    state = state.with_step(law.id, fit, (error_um, error_um))
     state = state.accepting((law.id,), probability, before)
     reason = (
         f'A learned law over {law.over} was added as asked; the film depends on it with a '

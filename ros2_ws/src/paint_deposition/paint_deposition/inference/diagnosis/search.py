@@ -80,7 +80,7 @@ class EffectSet:
         """The effects of the set, as fitted."""
         return {effect.id: effect for effect in self.state.candidates_in(self.fit)}
 
-    @property
+    @cached_property
     def result(self) -> Fit:
         """The pattern and the effects fitted to the readings alone, from either pattern."""
         return self.state.fitted_with(
@@ -368,6 +368,13 @@ class Search:
         found = [cause for cause in found if weights[cause] > others.log_weight] or [name]
         shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
         members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
+        if len(members) > 1:
+            # The discrepancy may stand for most of what the first is to explain: it gives way to
+            # one that by itself takes twice as much away.
+            taken = [others.result.objective - tried[one].result.objective for one in members]
+            most = int(np.argmax(taken))
+            if taken[most] > 2.0 * max(taken[0], SAME):
+                members.insert(0, members.pop(most))
         odds = self._log_odds(others, tried)
         own = [odds.pop(member) for member in members]
         return tuple(members), inclusion_of(own, [0.0, *odds.values()])

@@ -4,7 +4,7 @@ What is added is the caller's choice: ``diagnose`` adds what is most probable, `
 user asks for.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -83,12 +83,16 @@ class DiagnosisState:
         library: Mapping[str, type[Effect]],
         seed: int,
         known: Posterior | None = None,
+        sound: Collection[str] = (),
     ) -> 'DiagnosisState':
-        """Fit a model to a campaign; effects of a library may be added to it."""
+        """Fit a model to a campaign; effects of a library may be added to it.
+
+        Readings at points with the labels ``sound`` are no outliers.
+        """
         candidates = candidates_beside(start, library)
         prior, remarks = prior_for(known, campaign)
         effects = (*start.effects, *(shapes[0] for shapes in candidates.values()))
-        study, fit = clean_and_fit(campaign, start, effects, STARTS, seed, prior)
+        study, fit = clean_and_fit(campaign, start, effects, STARTS, seed, prior, sound)
         first = (Step.of(study, '', fit),)
         return DiagnosisState(study, start, prior, remarks, candidates, seed, fit, first)
 
@@ -178,7 +182,9 @@ class DiagnosisState:
         start = fit.model.model_copy(update={'effects': (*fit.model.effects, *laws)})
         return self.study.fit(self._free(start), nuisance=self.study.nuisance)
 
-    def with_step(self, added: str, fit: Fit, holdout_um: float | None = None) -> 'DiagnosisState':
+    def with_step(
+        self, added: str, fit: Fit, holdout_um: tuple[float, float] | None = None
+    ) -> 'DiagnosisState':
         """The state with a newer model; see ``Step.of``."""
         step = Step.of(self.study, added, fit, holdout_um)
         return replace(self, fit=fit, history=(*self.history, step))
@@ -224,6 +230,10 @@ class DiagnosisState:
     ) -> Diagnosis:
         """Put the results together."""
         not_testable, detectable = self.testable or ((), {})
+        final = replace(self.fit, discrepancy=self.discrepancy)
+        accepted = tuple(
+            replace(c, parameters=intervals(final, c.best) or c.parameters) for c in self.accepted
+        )
         listed = {member for c in (*self.accepted, *others) for member in c.members}
         return Diagnosis(
             self.study,
@@ -231,7 +241,7 @@ class DiagnosisState:
             reason,
             p_value,
             tuple(c.best for c in self.accepted),
-            (*self.accepted, *others),
+            (*accepted, *others),
             tuple(
                 replace(step, fit=replace(step.fit, discrepancy=self.discrepancy))
                 for step in self.history
@@ -246,7 +256,7 @@ class DiagnosisState:
 
 def intervals(fit: Fit, effect_id: str) -> dict[str, Estimate]:
     """An effect's parameters by name, with 95 % intervals within what is physical."""
-    every = {estimate.name: estimate for estimate in estimates(fit.marginal)}
+    every = {estimate.name: estimate for estimate in estimates(fit)}
     of = f'{effect_id}.'
     return {name.removeprefix(of): one for name, one in every.items() if name.startswith(of)}
 

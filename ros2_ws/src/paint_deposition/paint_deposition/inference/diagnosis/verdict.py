@@ -89,6 +89,8 @@ class Step:
     # where no other part could tell it, see ``levels_untold``.
     rmse_um: float
     holdout_rmse_um: float
+    # The latter if the effects that were found with all readings are kept, and only refitted.
+    refitted_rmse_um: float
 
     @property
     def model(self) -> DepositionModel:
@@ -100,17 +102,24 @@ class Step:
         return beyond_noise_um(self.holdout_rmse_um, noise_um)
 
     @staticmethod
-    def of(study: Study, added: str, fit: Fit, holdout_um: float | None = None) -> Step:
+    def of(
+        study: Study, added: str, fit: Fit, holdout_um: tuple[float, float] | None = None
+    ) -> Step:
         """Compute the errors of a fit.
 
         Args:
-            holdout_um: that on points left out, where it is known: if the choice of the model was
-                made without them, too [um]; default: if the model was refitted without them.
+            holdout_um: those on points left out, where they are known: if the choice of the model
+                was made without them, too, and if it was only refitted [um].
         """
         if holdout_um is None:
             without = partial(study.predicted_without_um, fit)
-            holdout_um = float(study.errors_left_out_um(without))
-        return Step(added, fit, study.residuals(fit.predicted_um).rmse_um, holdout_um)
+            holdout_um = 2 * (float(study.errors_left_out_um(without)),)
+        return Step(added, fit, study.residuals(fit.predicted_um).rmse_um, *holdout_um)
+
+    @property
+    def is_found_by_few(self) -> bool:
+        """Whether parts left out leave too few readings to find what all of them show."""
+        return abs(self.refitted_rmse_um - self.holdout_rmse_um) > 0.15 * self.holdout_rmse_um
 
 
 @dataclass(frozen=True)
@@ -279,6 +288,7 @@ class Diagnosis:
                 'after': after.rmse_um,
                 'holdout_before': before.holdout_rmse_um,
                 'holdout_after': after.holdout_rmse_um,
+                'holdout_after_refitted': after.refitted_rmse_um,
                 'beyond_noise_before': before.beyond_noise_um(noise_um),
                 'beyond_noise_after': after.beyond_noise_um(noise_um),
                 'noise_floor': noise_um,

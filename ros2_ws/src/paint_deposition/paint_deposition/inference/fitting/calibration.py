@@ -201,7 +201,7 @@ def calibrate(
     short = short_reaches(study.campaign, fit.model)
     moved = shifts(study, fit, short, best_fit)
     off = with_mean_level(fit, study.campaign, moved)
-    values, pairs = estimates(fit.marginal, off), correlations(fit.marginal, off)
+    values, pairs = estimates(fit, off), correlations(fit, off)
     widened = 'the intervals are widened by what the fit changes without the readings at the ends'
     warnings = [*_warnings(study, fit, values, pairs), *impossible_brushes(fit.model)]
     warnings += [f'{reach}; {widened}' for reach in short.values()]

@@ -8,7 +8,7 @@ by the gauge's noise and the film's finest texture: that is how well its mean is
 coarser than a cell is not averaged out.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,6 +42,7 @@ def clean_and_fit(
     starts: int = STARTS,
     seed: int = 0,
     known: Posterior | None = None,
+    sound: Collection[str] = (),
 ) -> tuple[Study, Fit]:
     """A campaign prepared for inference without its outliers, and the pattern fitted to it.
 
@@ -50,6 +51,7 @@ def clean_and_fit(
     Args:
         start: first guess of the pattern; its effects are refitted, too.
         effects: those whose amplitudes may be varied later.
+        sound: labels of points whose readings are no outliers.
 
     Raises:
         ReadingsError: readings in another unit, with the remedy.
@@ -62,17 +64,17 @@ def clean_and_fit(
     if not fit.predicted_um.any():
         return study, fit
     if len(study) >= FEWEST_POINTS:
-        study, fit = _cleaned(study, fit, start, starts, seed, known)
+        study, fit = _cleaned(study, fit, start, starts, seed, known, sound)
     return replace(study, mistakes=find_mistakes(study, fit, start)), fit
 
 
 def _cleaned(
     study: Study, fit: Fit, start: DepositionModel, starts: int, seed: int,
-    known: Posterior | None,
+    known: Posterior | None, sound: Collection[str],
 ) -> tuple[Study, Fit]:  # fmt: skip
     """The study without outliers, with the film's texture and what facets cost."""
     misfit = fitted_points(study, fit)
-    if found := _outliers(study, fit, misfit):
+    if found := _outliers(study, fit, misfit, sound):
         kept = ~np.isin(np.arange(len(study)), list(found))
         study = replace(study.of_points(kept), outliers=tuple(found.values()))
         fit = _fitted(study, start, starts, seed, known)
@@ -98,17 +100,20 @@ def _fitted(
     return study.fit(parameters, starts, seed, study.nuisance)
 
 
-def _outliers(study: Study, fit: Fit, misfit: FittedPoints) -> dict[int, Outlier]:
+def _outliers(
+    study: Study, fit: Fit, misfit: FittedPoints, sound: Collection[str]
+) -> dict[int, Outlier]:
     readings = study.campaign.readings
     label = readings.point[readings.first]
-    film = study.measured_um
+    film, open_to_doubt = study.measured_um, readings.repeats == 1
+    open_to_doubt &= ~np.isin(label, list(sound))
     return {
         row: Outlier(
             str(label[row]), float(film[row]), float(fit.predicted_um[row] + residual_um),
             sigma_um, *(() if other is None else (str(label[other]), float(film[other]))),
         )
         for row, (residual_um, sigma_um, other) in
-        find_outliers(misfit, readings.repeats == 1).items()
+        find_outliers(misfit, open_to_doubt).items()
     }  # fmt: skip
 
 

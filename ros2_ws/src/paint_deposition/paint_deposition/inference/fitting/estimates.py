@@ -1,11 +1,12 @@
 """Fitted parameters with their uncertainties, and what no law explains, in figures for people."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
-from paint_deposition.inference.fitting.least_squares import STEP, Fit
+from paint_deposition.inference.fitting.least_squares import STEP, Fit, covariance_factor
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES, PatternVector
 
 # Places of K3 and phi among the parameters of a pattern.
@@ -82,12 +83,22 @@ def correlations(fit: Fit, shifts: np.ndarray | None = None) -> dict[tuple[str, 
 def scaled_covariance(fit: Fit, shifts: np.ndarray | None = None) -> np.ndarray:
     """(k, k) covariance of the fit's vector, widened where residuals exceed the noise.
 
-    ``shifts`` (n, k) of the vector, each as likely as not, are added as further standard
-    deviations of their own directions.
+    Where the fit has a discrepancy for which its vector was not chosen, the vector is further off
+    than the best one: the covariance is the sandwich of White (Econometrica 50:1, 1982).
+
+    Args:
+        shifts: (n, k) of the vector, each as likely as not, which are added as further standard
+            deviations of their own directions.
     """
-    data = fit.jacobian.T @ fit.jacobian / max(fit.chi_square_per_freedom, 1.0)
-    whitening = fit.parameters.prior.whitening
-    covariance = np.linalg.inv(data + whitening.T @ whitening)
+    plain, whitening = replace(fit, discrepancy=None).marginal, fit.parameters.prior.whitening
+    data, prior = plain.jacobian.T @ plain.jacobian, whitening.T @ whitening
+    spread, gain = data, np.linalg.inv(data + prior)
+    if fit.discrepancy is not None:
+        factor = covariance_factor(fit.nuisance)
+        turned = solve_triangular(factor, plain.jacobian, lower=True, trans='T')
+        spread = data + turned.T @ fit.discrepancy @ turned
+    spread = max(fit.marginal.chi_square_per_freedom, 1.0) * spread
+    covariance = gain @ (spread + prior) @ gain
     return covariance if shifts is None else covariance + shifts.T @ shifts
 
 

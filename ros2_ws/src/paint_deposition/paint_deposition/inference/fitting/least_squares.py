@@ -62,11 +62,16 @@ class Fit:
     def amplitudes(self) -> tuple[np.ndarray, np.ndarray]:
         """Posterior mean (n,) and covariance (n, n) of the nuisance directions' amplitudes.
 
-        The model is linear around the fit, and its vector is not known exactly either.
+        The model is linear around the fit, its vector is not known exactly either, and there is
+        the discrepancy.
         """
         prior, count = self.parameters.prior, self.nuisance.shape[1]
         columns = np.hstack([self.nuisance, self.jacobian @ prior.factor])
         raw = self.residual + self.jacobian @ (self.vector - prior.centre)
+        if self.discrepancy is not None:
+            factor = covariance_factor(self.nuisance[:, :0], self.discrepancy)
+            whitened = solve_triangular(factor, np.column_stack([raw, columns]), lower=True)
+            raw, columns = whitened[:, 0], whitened[:, 1:]
         covariance = np.linalg.inv(np.eye(columns.shape[1]) + columns.T @ columns)
         mean = covariance @ (columns.T @ raw)
         return mean[:count], covariance[:count, :count]

@@ -211,13 +211,43 @@ def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, Expecte
         if not out and expit(log_odds[worst]) >= LEAST_PROBABILITY:
             out = {worst: (*left.predicted_by_others(worst), None)}
         if not out:
-            return found
+            return _without_features(misfit, found, left, kept)
         # A greater share of outliers means that the model is at fault.
         if len(found) + len(out) > max(0.05 * count, len(out)):
             return {}
         found |= {int(kept[row]): expected for row, expected in out.items()}
         kept = np.delete(kept, list(out))
         left = misfit.select(kept)
+
+
+def _without_features(
+    misfit: FittedPoints, found: dict[int, Expected], left: FittedPoints, kept: np.ndarray
+) -> dict[int, Expected]:
+    """Outliers by their row, without those beside which the part is off the same way.
+
+    Slips do not lie next to each other: there the part has a feature, such as a stripe. What is
+    off by more than half the film is a slip wherever it lies.
+
+    Args:
+        left: the others, which are the rows ``kept`` of all.
+    """
+    # Places on parts so far from each other are no neighbours [m].
+    places_m = np.column_stack([misfit.positions_m, 1e6 * misfit.experiment_of])
+    slips = dict(found)
+    for row, (mean_um, _, other) in found.items():
+        off_um = misfit.residual_um[row] - mean_um
+        if abs(off_um) > 0.5 * misfit.predicted_um[row]:
+            continue
+        # Its four nearest neighbours, after itself.
+        for near in np.argsort(np.linalg.norm(places_m - places_m[row], axis=1))[1:5]:
+            expected = found.get(int(near))
+            if expected is None:
+                expected = left.predicted_by_others(int(np.searchsorted(kept, near)))
+            away = (misfit.residual_um[near] - expected[0]) / expected[1]
+            if away * np.sign(off_um) > GUESS_SIGMAS:
+                slips.pop(row, None)
+                slips.pop(other, None)
+    return slips
 
 
 def _swapped(

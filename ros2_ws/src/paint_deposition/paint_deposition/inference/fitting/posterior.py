@@ -45,7 +45,7 @@ def posterior_of(
         footprint = float(f'{footprint[0]:.3g}'), float(f'{footprint[1]:.3g}')
     parameters = fit.parameters
     scale, shifts = parameters.scale, with_mean_level(fit, campaign, shifts)
-    covariance = scaled_covariance(fit.marginal, shifts) * np.outer(scale, scale)
+    covariance = scaled_covariance(fit, shifts) * np.outer(scale, scale)
     known = parameters.known.readings if parameters.known else ()
     return Posterior.of(
         parameters.coordinates, parameters.offset + scale * fit.vector,

@@ -92,13 +92,16 @@ def random_effects(
     return tuple(effects for effects in (level, zero) if effects.mixing.any())
 
 
-def levels_untold(campaign: Campaign, film_um: np.ndarray, sigma_um: np.ndarray) -> np.ndarray:
-    """(P, n) directions of the levels that no other part tells: of those with something off.
+def levels_untold(
+    campaign: Campaign, film_um: np.ndarray, sigma_um: np.ndarray, used: np.ndarray
+) -> np.ndarray:
+    """(P, n) directions of the levels of parts with something off that no reading used (P,) tells.
 
     Of a film (P,) that may be off by more than a little, unlike the one that was measured.
     """
     part_of, off = _parts(campaign)
-    return OTHER_LEVEL_SHARE * part_of[:, off] * (film_um / sigma_um)[:, np.newaxis]
+    untold = off & ~part_of[used].any(axis=0)
+    return OTHER_LEVEL_SHARE * part_of[:, untold] * (film_um / sigma_um)[:, np.newaxis]
 
 
 def _parts(campaign: Campaign) -> tuple[np.ndarray, np.ndarray]:

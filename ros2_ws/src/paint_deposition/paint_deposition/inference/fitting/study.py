@@ -273,8 +273,10 @@ class Study:
             replace(fit.parameters, start=fit.model), nuisance=kept * np.hstack([own, nuisance]),
             others=(fit.parameters.start,),
         )  # fmt: skip
-        amounts = found.amplitudes[0][:count]
-        return found.predicted_um + self.sigma_um * (own @ amounts)
+        # Levels that other readings tell are predicted, too: of the film that is predicted.
+        film_um, amounts = found.predicted_um, found.amplitudes[0]
+        levels = _columns(random_effects(self.campaign, film_um, self.sigma_um, ~out), len(self))
+        return film_um + self.sigma_um * (own @ amounts[:count] + levels @ amounts[count:])
 
     def errors_left_out_um(self, predict: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """(...) root mean square errors on parts that are left out in turn [um].
@@ -288,8 +290,8 @@ class Study:
     ) -> np.ndarray:
         """(..., P) squared errors at the points of folds that are left out in turn [um2].
 
-        Levels of which the other parts say nothing are estimated from the part's own readings, as
-        in ``residuals``: see ``levels_untold``.
+        Levels of which the other readings say nothing are estimated from the part's own, as in
+        ``residuals``: see ``levels_untold``.
 
         Args:
             predict: gives (..., P) films by models that were made without some readings, (P,)
@@ -304,7 +306,7 @@ class Study:
 
     def _errors_um(self, film_um: np.ndarray, out: np.ndarray) -> np.ndarray:
         """(P,) errors of a film (P,) on points left out, beside levels untold; 0 elsewhere."""
-        levels = levels_untold(self.campaign, film_um, self.sigma_um)[out]
+        levels = levels_untold(self.campaign, film_um, self.sigma_um, ~out)[out]
         errors_um = np.zeros(len(self))
         misfit = ((self.measured_um - film_um) / self.sigma_um)[out]
         errors_um[out] = self.sigma_um[out] * _beside(levels, misfit)
@@ -322,9 +324,9 @@ class Study:
             if off_um[worst] > self.gauge_um[worst]:
                 found.append(
                     f'The mesh of {name} is coarser than its curvature allows: its facets put the '
-                    f'film off by up to {off_um[worst]:.1f} µm at the readings, where the gauge '
-                    f'has a noise of {self.gauge_um[worst]:.1f} µm. That counts as noise; export '
-                    'the mesh finer.'
+                    f'film off by up to {off_um[worst]:.1f} µm at the readings, where gauge noise '
+                    f'is {self.gauge_um[worst]:.1f} µm. That counts as noise; export the mesh '
+                    'finer.'
                 )
         return tuple(found)
 
