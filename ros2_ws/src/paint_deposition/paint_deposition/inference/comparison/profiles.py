@@ -4,6 +4,7 @@ Conner, Atkar, Rizzi and Choset (IROS 2002), section 4.3: profiles by column, wi
 of each single pass.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -95,7 +96,9 @@ def _lines(
 
     With each: whether it is longer upright than across, and whether it is a strip.
     """
-    labels = sorted({str(g) for g in experiment.groups if g}, key=_natural)
+    # 'column 2' before 'column 10': text and numbers in turn.
+    parts = {str(g): re.split(r'(\d+)', str(g)) for g in experiment.groups if g}
+    labels = sorted(parts, key=lambda g: [int(p) if p.isdigit() else p for p in parts[g]])
     for label in labels:
         members = np.flatnonzero(experiment.groups == label)
         yield label, members, np.ptp(height_m[members]) >= np.ptp(across_m[members]), False
@@ -109,12 +112,6 @@ def _lines(
         ends = 1e3 * aside[part].min(), 1e3 * aside[part].max()
         label = f'{what} {ends[0]:.0f} to {ends[1]:.0f} mm' if count > 1 else 'all readings'
         yield label, part, upright, True
-
-
-def _natural(label: str) -> tuple:
-    """Sorts 'column 2' before 'column 10'."""
-    digits = ''.join(c if c.isdigit() else ' ' for c in label).split()
-    return (label.rstrip('0123456789'), int(digits[-1]) if digits else 0, label)
 
 
 def _film_along(

@@ -130,7 +130,7 @@ class NullModel:
             None if discrepancy is None else discrepancy[:count, :count],
             self.lower[:count, :count],
             self.deviation[:count],
-            self._held_at(slice(count)),
+            self.held and (self.held[0][:count], *self.held[1:]),
         )
 
     def predicted(self, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -149,11 +149,8 @@ class NullModel:
     def select(self, rows: np.ndarray) -> 'NullModel':
         """The null hypothesis for some of the readings."""
         kept = None if self.discrepancy is None else self.discrepancy[np.ix_(rows, rows)]
-        held = self._held_at(rows)
+        held = self.held and (self.held[0][rows], *self.held[1:])
         return NullModel.of(self.columns[rows], self.scaled_deviation[rows], kept, held)
-
-    def _held_at(self, rows: np.ndarray | slice) -> AtBounds | None:
-        return None if self.held is None else (self.held[0][rows], *self.held[1:])
 
 
 @dataclass(frozen=True)

@@ -267,9 +267,8 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     # The strongest contrast is the place to look at: what is widest, or off the other way, may
     # only balance it.
     first = max(regions, key=lambda region: abs(region.mean_residual_um), default=None)
-    alike = {
-        one.experiment for one in regions if one.mean_residual_um * first.mean_residual_um > 0.0
-    }
+    sign = np.sign(first.mean_residual_um) if first else 0.0
+    alike = {one.experiment for one in regions if sign * one.mean_residual_um > 0.0}
     names = [experiment.name for experiment in study.campaign.experiments]
     shown = [name for name in names if name in alike]
     mean_um = float(np.mean(study.measured_um[first.rows])) if first else np.nan

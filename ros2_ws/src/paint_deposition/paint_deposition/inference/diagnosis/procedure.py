@@ -219,7 +219,8 @@ def _conclude(
         return state.diagnosis(p_value, 'undecided', reason, others)
     reason = f'Something is missing that no effect of the library explains. {unknown}'
     p_of_levels, doubt = state.study.level_doubt(state.fit.predicted_um)
-    if doubt and p_of_levels < p_value:
+    # What is far less probable comes first.
+    if doubt and p_of_levels < 0.1 * p_value:
         reason = f'{doubt} {reason}'
     for over in (c.best.removeprefix('learned:') for c in state.accepted):
         alike = [n for n, shapes in state.candidates.items() if over in shapes[0].covariates]

@@ -125,7 +125,9 @@ def fit_readings(
         candidates += _best_starts(problem, first, starts - 1, seed)
     for other in others:
         start = parameters.encode(parameters.start.with_patterns(other.patterns))
-        if all(problem.are_apart(start, one) for one in candidates):
+        # Patterns whose shapes differ by less lead to the same fit.
+        away = (np.array(candidates) - start) / problem.prior.width
+        if np.abs(away[:, problem.shape]).max(axis=1).min() > APART:
             candidates.append(start)
     if len(candidates) > 1:
         # A few steps from each start; the best are refined.
@@ -244,11 +246,6 @@ class _Problem:
             k for k, entry in enumerate(parameters.pattern.coordinates)
             if entry.name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
         ]  # fmt: skip
-
-    def are_apart(self, one: np.ndarray, other: np.ndarray) -> bool:
-        """Whether the patterns of two vectors have shapes that may lead to different fits."""
-        away = (one - other)[self.shape] / self.prior.width[self.shape]
-        return bool(np.abs(away).max() > APART)
 
     def of_weights(self, vector: np.ndarray) -> OfWeights:
         key = vector.tobytes()

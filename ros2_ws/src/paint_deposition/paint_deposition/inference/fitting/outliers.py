@@ -233,20 +233,21 @@ def _without_features(
     """
     # Places on parts so far from each other are no neighbours [m].
     places_m = np.column_stack([misfit.positions_m, 1e6 * misfit.experiment_of])
-    slips = dict(found)
+    slips = found
     for row, (mean_um, _, other) in found.items():
         off_um = misfit.residual_um[row] - mean_um
         if abs(off_um) > 0.5 * misfit.predicted_um[row]:
             continue
         # Its four nearest neighbours, after itself.
         for near in np.argsort(np.linalg.norm(places_m - places_m[row], axis=1))[1:5]:
-            expected = found.get(int(near))
-            if expected is None:
-                expected = left.predicted_by_others(int(np.searchsorted(kept, near)))
-            away = (misfit.residual_um[near] - expected[0]) / expected[1]
+            if near in found:
+                expected_um, sigma_um, _ = found[near]
+            else:
+                there = int(np.searchsorted(kept, near))
+                expected_um, sigma_um = left.predicted_by_others(there)
+            away = (misfit.residual_um[near] - expected_um) / sigma_um
             if away * np.sign(off_um) > GUESS_SIGMAS:
-                slips.pop(row, None)
-                slips.pop(other, None)
+                slips = {k: v for k, v in slips.items() if k not in (row, other)}
     return slips
 
 
