@@ -285,10 +285,10 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[s
         for name, value in effects.parameters.items():
             yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
     before, after = diagnosis.history[0], diagnosis.history[-1]
-    refitted = f' ({after.refitted_rmse_um:.2f} where what was found is only refitted)'
+    nested = f' ({after.nested_rmse_um:.2f} where what is missing is sought anew without each)'
     yield (
         f'RMSE {before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on '
-        f'{diagnosis.left_out} held out{refitted if after.is_found_by_few else ""}, '
+        f'{diagnosis.left_out} held out{nested if after.needs_all else ""}, '
         f'{before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the fitted points; gauge and texture '
         f'{diagnosis.study.noise_floor_um:.2f} µm'
     )

@@ -224,15 +224,18 @@ class OrthogonalDirections:
         precision = 1.0 + sizes**2 * self.squares
         explained = (sizes**2 / precision) @ scores**2
         factors = -0.5 * np.log(precision).sum(axis=1, keepdims=True)
+        noise = np.ones_like(explained)
         if np.isfinite(freedom):
             count = freedom + len(deviations)
             factors = factors - 0.5 * count * np.log1p(-explained / (freedom + squares))
+            # Size of the noise that is left, over that which was told.
+            noise = np.sqrt((freedom + squares - explained) / count)
         else:
             factors = factors + 0.5 * explained
         for row, side in zip(self.signed, self.sides, strict=True):
             mean = (sizes * row / precision) @ scores
             deviation = np.sqrt((row**2 / precision).sum(axis=1, keepdims=True))
-            factors += np.log(2.0) + log_ndtr(side * mean / deviation)
+            factors += np.log(2.0) + log_ndtr(side * mean / (deviation * noise))
         return factors
 
 

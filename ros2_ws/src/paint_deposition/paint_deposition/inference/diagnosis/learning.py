@@ -185,9 +185,9 @@ class LeftOut:
     def errors_um(
         self, laws: Sequence[Sized] = (), without: frozenset[str] = frozenset()
     ) -> tuple[float, float]:
-        """On parts left out with what the others lead to, and as with ``keeping_effects`` [um].
+        """On parts left out as with ``keeping_effects``, and with what the others lead to [um].
 
-        With as many of some laws as they bear out; with nothing at all where their test finds
+        With as many of some laws as these bear out; with nothing at all where their test finds
         nothing, but something was found with all parts.
         """
         nothing, folds = self.nothing, self.study.folds()
@@ -203,7 +203,7 @@ class LeftOut:
             squares_um2[out] = self.errors_by_count_um(without, rows=out)[count] ** 2
         error_um = float(np.sqrt(np.mean(squares_um2)))
         keeping = self.keeping_effects
-        return error_um, error_um if keeping is self else keeping.errors_um(laws, without)[0]
+        return error_um if keeping is self else keeping.errors_um(laws, without)[0], error_um
 
     @cached_property
     def keeping_effects(self) -> 'LeftOut':

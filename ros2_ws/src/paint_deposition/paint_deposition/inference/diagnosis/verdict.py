@@ -89,8 +89,8 @@ class Step:
     # where no other part could tell it, see ``levels_untold``.
     rmse_um: float
     holdout_rmse_um: float
-    # The latter if the effects that were found with all readings are kept, and only refitted.
-    refitted_rmse_um: float
+    # The latter if the effects are sought anew without them, too.
+    nested_rmse_um: float
 
     @property
     def model(self) -> DepositionModel:
@@ -108,8 +108,7 @@ class Step:
         """Compute the errors of a fit.
 
         Args:
-            holdout_um: those on points left out, where they are known: if the choice of the model
-                was made without them, too, and if it was only refitted [um].
+            holdout_um: both errors on points left out, where they are known [um].
         """
         if holdout_um is None:
             without = partial(study.predicted_without_um, fit)
@@ -117,9 +116,9 @@ class Step:
         return Step(added, fit, study.residuals(fit.predicted_um).rmse_um, *holdout_um)
 
     @property
-    def is_found_by_few(self) -> bool:
+    def needs_all(self) -> bool:
         """Whether parts left out leave too few readings to find what all of them show."""
-        return abs(self.refitted_rmse_um - self.holdout_rmse_um) > 0.15 * self.holdout_rmse_um
+        return abs(self.nested_rmse_um - self.holdout_rmse_um) > 0.15 * self.holdout_rmse_um
 
 
 @dataclass(frozen=True)
@@ -287,8 +286,8 @@ class Diagnosis:
                 'before': before.rmse_um,
                 'after': after.rmse_um,
                 'holdout_before': before.holdout_rmse_um,
-                'holdout_after': after.holdout_rmse_um,
-                'holdout_after_refitted': after.refitted_rmse_um,
+                'holdout_after': after.nested_rmse_um,
+                'holdout_after_refitted': after.holdout_rmse_um,
                 'beyond_noise_before': before.beyond_noise_um(noise_um),
                 'beyond_noise_after': after.beyond_noise_um(noise_um),
                 'noise_floor': noise_um,
