@@ -41,9 +41,9 @@ def doubles(values) -> bytes:
 
 
 def egm_robot(number: int, tm_ms: int, placed: bool = True) -> bytes:
-    """EgmRobot with all that a controller sends, more than is read of it."""
+    """EgmRobot with all that a controller sends, more than is read of it; or without a place."""
     place = numbered([numbered(MM), numbered(WXYZ), numbered((180.0, 0.0, 90.0))])
-    place = place if placed else b''
+    place = place if placed else field(2, numbered(WXYZ))
     clock = numbered((1_760_000_000, 250_000))
     position = numbered([doubles(DEGREES), place, doubles((1500.0, 0.0)), clock])
     state = field(1, 3)

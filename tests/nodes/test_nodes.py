@@ -2,6 +2,7 @@
 
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -156,6 +157,7 @@ REFUSED = {
     ],
     'run_recorder': [
         ({'mesh_file': '/nowhere.stl'}, 'mesh_file /nowhere.stl: No such file or directory'),
+        ({'model_file': 'loop/model.yaml'}, 'model_file loop/model.yaml: .*symbolic links'),
         ({'output_directory': '/dev/null/runs', 'name': 'run'},
          'cannot create /dev/null/runs/run'),
     ],
@@ -170,6 +172,7 @@ REFUSED = {
 @pytest.mark.parametrize('node', REFUSED)
 def test_what_a_node_cannot_start_with_is_refused_in_a_line(node, start, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    Path('loop').symlink_to('loop')
     write_model('thin.yaml', DepositionModel())
     write_model('sagging.yaml', DepositionModel(effects=(Sag.typical(),)))
     for values, words in REFUSED[node]:

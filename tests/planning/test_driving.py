@@ -14,6 +14,7 @@ import robot_arm
 from cli.command import figures_of, ran, told_in
 from paint_deposition.api.planning import read_robot
 from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.transforms import Rigid, at_part, moved
@@ -212,6 +213,24 @@ def test_the_place_to_choose_has_good_neighbours(cell):
     assert 'not all places beside it were tried' in alone.sentence
 
 
+def driven_in(folder):
+    with AnyReader([folder]) as bag:
+        (message,) = [
+            bag.deserialize(raw, connection.msgtype)
+            for connection, _, raw in bag.messages()
+            if connection.topic == '/joint_trajectory'
+        ]
+    return message
+
+
+def test_a_time_just_before_a_second_is_that_second(on_robot, tmp_path):
+    drive = on_robot.drive
+    moved = replace(drive, seconds=drive.seconds - drive.seconds[1] + 1.9999999996)
+    times = [point.time_from_start for point in driven_in(
+        write_pose_bag(tmp_path / 'drive', drive.trajectory, drive=moved)).points]
+    assert (times[1].sec, times[1].nanosec) == (2, 0)
+
+
 def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
     flat = planned.surface
     trimesh.Trimesh(flat.vertices_m, flat.faces, process=False).export(tmp_path / 'flat.stl')
@@ -225,12 +244,7 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
     figures = told_in(tmp_path / 'plan/plan.json')['robot']
     assert figures['joints'] == list(cell.arm.joints)
     table = np.loadtxt(tmp_path / 'plan/joints.csv', delimiter=',', skiprows=1)
-    with AnyReader([tmp_path / 'plan/trajectory']) as bag:
-        (message,) = [
-            bag.deserialize(raw, connection.msgtype)
-            for connection, _, raw in bag.messages()
-            if connection.topic == '/joint_trajectory'
-        ]
+    message = driven_in(tmp_path / 'plan/trajectory')
     np.testing.assert_allclose([p.positions for p in message.points], table[:, 1:], atol=1e-6)
     given = '--trajectory', tmp_path / 'plan/trajectory', *robot
     ran('improve', *part, *given, '--model', model, '-o', tmp_path / 'better')

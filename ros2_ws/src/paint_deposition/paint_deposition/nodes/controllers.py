@@ -212,17 +212,20 @@ class RwsSource(SignalSource):
             kept = '; '.join(f'{cookie.name}={cookie.value}' for cookie in cookies.cookiejar)
             protocols: Any = ['robapi2_subscription']
             with connect(
-                events, subprotocols=protocols, additional_headers={'Cookie': kept}
-            ) as socket:
+                events, subprotocols=protocols, additional_headers={'Cookie': kept},
+                open_timeout=TIMEOUT_S, close_timeout=POLL_S,
+            ) as socket:  # fmt: skip
                 self._problem = ''  # all signals are subscribed to
                 self._take_all(first)
                 while not self.stopped.is_set():
                     with suppress(TimeoutError):
                         self._take_all(socket.recv(POLL_S))
         finally:
-            # A controller has few sessions, and keeps those that are not closed.
+            # A controller has few sessions, and keeps those that are not closed. To one that does
+            # not answer the node gives no time when it ends.
             with suppress(OSError):
-                opener.open(f'{url}/logout', None, TIMEOUT_S).close()
+                wait_s = POLL_S if self.stopped.is_set() else TIMEOUT_S
+                opener.open(f'{url}/logout', None, wait_s).close()
 
     def _take_all(self, event: str | bytes) -> None:
         """Take the value of each signal in an event, which is XHTML."""

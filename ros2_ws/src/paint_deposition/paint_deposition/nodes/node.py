@@ -72,8 +72,10 @@ class PaintNode(Node):
         try:
             self.values = declare_parameters(self, self.PARAMETERS)
             named = {name: v for name, v in self.values.items() if name != 'output_directory'}
-            files = [Path(file).resolve() for file in self._files_of(named)]
-            self._input_folders = [file if file.is_dir() else file.parent for file in files]
+            # Unlike the methods of a path, these mind no loop of links and no closed folder.
+            files = [os.path.realpath(file) for file in self._files_of(named)]
+            folders = [file if os.path.isdir(file) else os.path.dirname(file) for file in files]
+            self._input_folders = [Path(folder) for folder in folders]
             self._validate(self.values, set())
             self._start()
         except PaintError:

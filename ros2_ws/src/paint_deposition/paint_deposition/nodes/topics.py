@@ -174,8 +174,8 @@ class AdaptiveSubscription:
         is_newer = self._made_s[heard_by] < own_s and now_s - own_s < OVERLAP_S
         if offered != heard_by and not is_newer:
             return
-        # The number is 0 if the middleware has none.
-        number = info.get('publication_sequence_number') or 0
+        # 0 where the middleware has none, or ROS, before Kilted, does not say whose it is.
+        number = publisher and info.get('publication_sequence_number') or 0
         before = self._newest.pop(publisher, number)
         self._newest[publisher] = max(number, before)
         self.lost += max(number - before - 1, 0)

@@ -131,7 +131,8 @@ class WebView(PaintNode):
 
     def _take_part(self, part: Part) -> None:
         self._newest_ns, self._time_s = 0, 0.0
-        if part.mesh_file == self._mesh_file:
+        # A mesh that was exported anew has its old name.
+        if part.mesh_file == self._mesh_file and part.mesh_id in self._mesh_ids:
             self.scene.begin_again()
         else:
             try:
