@@ -222,7 +222,7 @@ def test_a_film_is_kept_until_it_is_on_disk(simulated, painted, change, tmp_path
         assert node.trigger_cleanup() == TransitionCallbackReturn.FAILURE
     assert node.configured
     unsaved = 'films of 1 former parts are not saved'
-    assert unsaved in node.tasks['state']()[1]
+    assert unsaved in node.parts.status()[1]
     node.trigger_activate()
     second = change(serial='2')
     assert (second.success, second.run, second.paths) == (True, '2', [])
@@ -235,9 +235,14 @@ def test_a_film_is_kept_until_it_is_on_disk(simulated, painted, change, tmp_path
     assert [Path(path).parent.name for path in third.paths] == 3 * ['1'] + 3 * ['2']
     assert saved_um(folder / '1/film.csv') == pytest.approx(film, rel=1e-7)
     assert node.parts.status()[0] == OK
-    node.trigger_deactivate()
-    assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
+    # Who shuts the node down is told of the film that is lost.
+    source.send(later(later(MOTION)))
+    painted(node, len(MOTION))
+    shutil.rmtree(folder)
+    folder.write_text('in the way')
+    assert node.trigger_shutdown() == TransitionCallbackReturn.FAILURE
     assert not node.configured
+    assert 'films of 1 former parts are not saved' in node.tasks['state']()[1]
 
 
 @pytest.mark.parametrize(('pose', 'frame'), [([], 'part'), ([0.0] * 6 + [1.0], 'cell')])

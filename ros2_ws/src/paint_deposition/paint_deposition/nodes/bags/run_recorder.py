@@ -274,7 +274,7 @@ class RunRecorder(ManagedNode):
         if self.active:
             self.trigger_deactivate()
         # The answer of a process that ends at once may be lost; its client would wait for ever.
-        self.create_steady_timer(1.0, self.finish)
+        self._lasting.add(self.create_steady_timer(1.0, self.finish))
         if not self.runs:
             message = 'nothing was recorded: the recorder was never activated'
             return Trigger.Response(success=True, message=message)
