@@ -184,6 +184,10 @@ def test_each_activation_is_a_whole_run(
     source = robot()
     assert managed('configure') == (True, 'inactive')
     assert not list(tmp_path.iterdir())
+    # What comes once, before there is a run, stays in force.
+    wait_until(source.state_publisher.get_subscription_count, what='the subscription')
+    source.send_state(MOTION.stamps_ns[0] - 1, 0.5)
+    wait_until(lambda: recorder.recorded['/atomizer/state'].messages, what='the state')
     # A run that is there is not overwritten.
     (tmp_path / 'run').mkdir()
     assert managed('activate') == (False, 'inactive')
@@ -200,6 +204,8 @@ def test_each_activation_is_a_whole_run(
         assert np.array_equal(recorded.stamps_ns, MOTION.stamps_ns[rows])
         wait_until(lambda: not source.pose_publisher.get_subscription_count())
     assert len(list(tmp_path.glob('run*'))) == 2
+    first = read_recording(tmp_path / 'run', None, '/atomizer/state')
+    assert first.trigger_flow.tolist() == [0.5, 1.0]
     assert call(viewer, Trigger, '/run_recorder/stop').success
     assert managed('shutdown') == (True, 'finalized')
     wait_until(recorder.finished.done, what='the end of the process', timeout_s=5.0)

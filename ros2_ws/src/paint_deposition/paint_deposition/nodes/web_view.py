@@ -181,8 +181,8 @@ class WebView(PaintNode):
 
     def _say(self, problem: str) -> None:
         """Tell what keeps the film from being shown; '' is nothing."""
-        if problem:
-            self.get_logger().error(problem, once=True)
+        if problem and problem != self._problem:
+            self.get_logger().error(problem)
         self._problem = problem
         self.scene.tell('message', text=problem)
 

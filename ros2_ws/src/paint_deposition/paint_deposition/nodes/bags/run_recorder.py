@@ -1,7 +1,6 @@
 """Node `run_recorder`: records a run in the layout of rosbag2, and reports lost messages."""
 
 import itertools
-import os
 import shutil
 import time
 from collections import Counter
@@ -66,15 +65,23 @@ class RunRecorder(ManagedNode):
         }
         self._part_pose = resolved(PART_POSE)
         self._initial_messages = InitialMessages(motion, self._part_pose)
-        # Also while no run is recorded, since they stay in force.
+        # Also while the node is inactive, since they stay in force.
         self._always_heard = {PARAMETER_EVENTS, *(states for _, states in motion.values())}
         self.recorded: dict[str, RecordedTopic] = {}
+        self._refused: set[str] = set()
+        self._begun_ns = time.time_ns()
+        # The run of the part that has left, while messages of it may come; until when, and by
+        # topic when the last of its messages was sent. Those that came even later.
+        self.leaving: RunWriter | None = None
+        self._leaves_s, self._too_late = 0.0, 0
+        self._left_ns: dict[str, int] = {}
         self._error: RecordingError | None = None
         self._progress = {
             poses: self.create_publisher(PoseProgress, gun_topic(gun, PROGRESS_TOPIC), PROGRESS)
             for gun, (poses, _) in motion.items()
         }
         self.create_service(Trigger, '~/stop', lambda *_: self._stop())
+        self.create_steady_timer(0.1, self._discover)
         return {'recording': self.status}
 
     def _activate(self) -> None:
@@ -85,13 +92,9 @@ class RunRecorder(ManagedNode):
         # Run and stamp of the part, as it was announced, and when.
         self._part: tuple[str, int] | None = None
         self._announced_ns = 0
-        self._refused: set[str] = set()
-        # The run of the part that has left, while poses of it may come; until when, and by topic
-        # when the last of its messages was sent. Those that came even later.
-        self.leaving: RunWriter | None = None
-        self._leaves_s, self._too_late = 0.0, 0
-        self._left_ns: dict[str, int] = {}
-        self.create_steady_timer(0.1, self._discover)
+        self._refused.clear()
+        self._left_ns.clear()
+        self._too_late = 0
         self.create_steady_timer(0.1, lambda: self._guarded(self.run.close_old_chunk))
         self.create_steady_timer(0.2, self._report_progress)
         self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
@@ -126,6 +129,8 @@ class RunRecorder(ManagedNode):
             if self._has_left(self.leaving):
                 self._guarded(self._end_of_leaving)
         for name in self._wanted:
+            if not (self.active or name in self._always_heard):
+                continue
             publishers = self.get_publishers_info_by_topic(name)
             if not publishers or name in self._refused or self._error is not None:
                 continue
@@ -140,7 +145,8 @@ class RunRecorder(ManagedNode):
                     self.recorded[name].match_qos()
                     continue
                 about = name, types[0], definitions.installed(types[0]), offered
-                self._guarded(self.run.add_topic, *about)
+                if self.active:
+                    self._guarded(self.run.add_topic, *about)
                 self.recorded[name] = RecordedTopic(
                     self, about, self._write, max_gap_ns, self._begun_ns,
                     depth=5000 if types[0] in MOTION_TYPES else 100,
@@ -214,9 +220,9 @@ class RunRecorder(ManagedNode):
         if not part.run and not any(self.run.counts.get(poses) for poses in self._progress):
             return  # a reset from before this recorder
         try:
-            # The mesh file of a simulator on another machine may not exist here.
-            mesh_file = part.mesh_file if os.path.isfile(part.mesh_file) else ''
-            data = provenance(mesh_file, self.values['model_file'])
+            # The mesh file is one of the simulator's machine: it is not opened here.
+            data = provenance('', self.values['model_file'])
+            data |= {'mesh_file': part.mesh_file, 'mesh_id': part.mesh_id}
             data |= {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
             if part.part_pose:
                 data['part_pose'] = ' '.join(map(str, part.part_pose))

@@ -62,6 +62,7 @@ class AtomizerInput:
         times_s: (computing time, duration of the motion) of the last batches.
         anomalies: other poses and states with something wrong, counted by its description.
         state_errors: why states were refused, each reason once.
+        unheard_states: why states of another type are not heard, as said last, '' if none come.
         steps: from pose to pose. These and all counts from `refused_frames` on are since the last
             reset.
     """
@@ -74,6 +75,7 @@ class AtomizerInput:
         self.poses_received = self.newest_ns = self.sent_ns = self.state_sent_ns = 0
         self.refused_s = self.pose_s = self._flushed_s = -math.inf
         self.spraying, self.programmed_m_per_s = False, 0.0
+        self.unheard_states = ''
         self.last_poses = NO_POSES
         self._newest: PoseStamped | None = None
         # Stamp of a state that is ahead of the poses, and when it was sent [ns].

@@ -144,10 +144,10 @@ class PartChange:
                 response.success = True
             else:
                 raise PaintError('prepare needs a mesh_file: name the mesh to read ahead of time')
-        except (PaintError, MemoryError) as error:
-            response.message = str(error) or 'not enough memory'
         except OSError as error:
             response.message = f'{error.filename}: {error.strerror}'
+        except Exception as error:  # of a user's effect, say: reported to the caller
+            response.message = str(error) or 'not enough memory'
         return response
 
     async def _change(self, request: ChangePart.Request, response: ChangePart.Response) -> str:
@@ -201,11 +201,11 @@ class PartChange:
         if not request.coat:
             read = self._prepared(version)
             part = read.result() if read.done() else await node.result_of(read)
-        if node.film.counts.received:
-            self._unsaved.append(self._film_writer())
+        writers = [self._film_writer()] if node.film.counts.received else []
         if part is not None:
             node.change_part(version[0], part)
             self._version = version
+        self._unsaved += writers
         self.part, self._since = following, datetime.now(timezone.utc)
         self._run, self._resets = following.run, 0
         self._publish(since_ns, request.part_pose)
