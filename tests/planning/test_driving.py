@@ -213,25 +213,7 @@ def test_the_place_to_choose_has_good_neighbours(cell):
     assert 'not all places beside it were tried' in alone.sentence
 
 
-def driven_in(folder):
-    with AnyReader([folder]) as bag:
-        (message,) = [
-            bag.deserialize(raw, connection.msgtype)
-            for connection, _, raw in bag.messages()
-            if connection.topic == '/joint_trajectory'
-        ]
-    return message
-
-
-def test_a_time_just_before_a_second_is_that_second(on_robot, tmp_path):
-    drive = on_robot.drive
-    moved = replace(drive, seconds=drive.seconds - drive.seconds[1] + 1.9999999996)
-    times = [point.time_from_start for point in driven_in(
-        write_pose_bag(tmp_path / 'drive', drive.trajectory, drive=moved)).points]
-    assert (times[1].sec, times[1].nanosec) == (2, 0)
-
-
-def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
+def test_the_commands_write_what_the_robot_drives(planned, cell, on_robot, tmp_path):
     flat = planned.surface
     trimesh.Trimesh(flat.vertices_m, flat.faces, process=False).export(tmp_path / 'flat.stl')
     model = tmp_path / 'round.yaml'
@@ -244,7 +226,20 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, tmp_path):
     figures = told_in(tmp_path / 'plan/plan.json')['robot']
     assert figures['joints'] == list(cell.arm.joints)
     table = np.loadtxt(tmp_path / 'plan/joints.csv', delimiter=',', skiprows=1)
-    message = driven_in(tmp_path / 'plan/trajectory')
+    drive, messages = on_robot.drive, []
+    late = replace(drive, seconds=drive.seconds - drive.seconds[1] + 1.9999999996)
+    write_pose_bag(tmp_path / 'late', drive.trajectory, drive=late)
+    for folder in ('plan/trajectory', 'late'):
+        with AnyReader([tmp_path / folder]) as bag:
+            messages += [
+                bag.deserialize(raw, connection.msgtype)
+                for connection, _, raw in bag.messages()
+                if connection.topic == '/joint_trajectory'
+            ]
+    message, moved = messages
+    # A time just before a second is that second.
+    at = moved.points[1].time_from_start
+    assert (at.sec, at.nanosec) == (2, 0)
     np.testing.assert_allclose([p.positions for p in message.points], table[:, 1:], atol=1e-6)
     given = '--trajectory', tmp_path / 'plan/trajectory', *robot
     ran('improve', *part, *given, '--model', model, '-o', tmp_path / 'better')

@@ -106,24 +106,6 @@ def test_states_of_another_version_keep_what_they_say(replayed, tmp_path):
     assert taken.brush == 0
 
 
-def test_pause_and_resume(onlooker, play, listen, call, wait_until, pass_bag):
-    caller, listener = onlooker(), listen()
-    player = play(pass_bag, rate=1.0, start_paused=True)
-    tell = partial(call, caller, Trigger)
-    assert tell('bag_player/resume').message == 'resumed'
-    assert not tell('bag_player/resume').success
-    wait_until(lambda: len(listener.poses) > 20, what='poses')
-    assert tell('bag_player/pause').success
-    assert tell('bag_player/pause').message == 'already paused'
-    paused_at = player.poses_published
-    caller.heard['/diagnostics'].clear()
-    wait_until(lambda: caller.reports('bag_player: replay', 'paused'))
-    assert player.poses_published - paused_at <= 1
-    assert tell('bag_player/resume').success
-    wait_until(lambda: len(listener.poses) > paused_at + 20, what='more poses')
-    assert listener.poses == recorded(pass_bag)[: len(listener.poses)]
-
-
 def test_a_loop_starts_over(play, listen, wait_until, tmp_path):
     bag = write_pose_bag(tmp_path / 'short', straight_pass(30, triggers=False))
     listener = listen()
@@ -201,25 +183,36 @@ def test_the_clock_runs_on_through_a_gap(play, listen, onlooker, wait_until, tmp
 
 @pytest.mark.parametrize('rate', [1.0, 0.0])
 def test_the_clock_stands_meanwhile(play, listen, onlooker, call, wait_until, pass_bag, rate):
-    """Before the start and while paused, also for who comes late; it runs with the first pose."""
+    """Before the start and while paused, also for who comes late; it runs with the first pose.
+
+    No pose is sent meanwhile, nor lost.
+    """
 
     def watch():
         viewer = onlooker('/clock')
         wait_until(lambda: len(viewer.heard['/clock']) > 5, what='the clock')
         return viewer
 
-    player = play(pass_bag, rate=rate, window=50)
+    player = play(pass_bag, rate=rate, window=50, start_paused=True)
     viewer = watch()
     tell = partial(call, viewer, Trigger)
+    assert [tell('bag_player/resume').message for _ in range(2)] == ['resumed', 'not paused']
     early = ticks(viewer) + ticks(watch())
     assert player.poses_published == 0
     assert set(early) == {straight_pass(700).stamps_ns[0]}
-    listen(reports=None if rate else False)
+    listener = listen(reports=None if rate else False)
     wait_until(lambda: player.poses_published >= 20, what='poses')
-    assert tell('bag_player/pause').success
+    for message in ('paused', 'already paused'):
+        answer = tell('bag_player/pause')
+        assert (answer.success, answer.message) == (True, message)
+    paused_at = player.poses_published
     (paused_ns,) = set(ticks(watch()))
+    wait_until(lambda: viewer.reports('bag_player: replay', 'paused'))
+    assert player.poses_published - paused_at <= 1
     assert tell('bag_player/resume').success
     if rate:
+        wait_until(lambda: len(listener.poses) > paused_at + 20, what='more poses')
+        assert listener.poses == recorded(pass_bag)[: len(listener.poses)]
         wait_until(lambda: ticks(viewer)[-1] > paused_ns + 10**8, what='the time of the replay')
         assert ticks(viewer) == sorted(ticks(viewer))
 

@@ -112,15 +112,19 @@ def test_no_more_is_asked_for(simulator, robot, onlooker, wait_until, capfd):
     assert not {'[WARN]', '[ERROR]'} & set(said.split())
 
 
-def test_a_bool_as_the_state_is_an_error(simulator, onlooker, ros_domain, wait_until):
+def test_a_bool_as_the_state_is_an_error(simulator, onlooker, ros_domain, wait_until, capfd):
     """It cannot be heard, and the gun would count as always on."""
-    simulator()
+    guns = ['left', 'right']
+    simulator(atomizers=guns)
     viewer, apart = onlooker(), Context()  # one participant has one type for a topic
     rclpy.init(context=apart, domain_id=ros_domain)
     controller = Node('plc', context=apart)
-    controller.create_publisher(Bool, 'atomizer/state', 10)
-    told = 'atomizer/state comes as std_msgs/msg/Bool and does not switch the gun'
-    wait_until(lambda: viewer.reports(POSES, told, b'\x02'))
+    for gun in guns:
+        controller.create_publisher(Bool, f'{gun}/atomizer/state', 10)
+        told = f'{gun}/atomizer/state comes as std_msgs/msg/Bool and does not switch the gun'
+        task = f'deposition_simulator: {gun}/poses'
+        wait_until(lambda name=task, said=told: viewer.reports(name, said, b'\x02'), what=told)
+        assert capfd.readouterr().err.count(told) == 1
     controller.destroy_node()
     apart.try_shutdown()
 

@@ -175,7 +175,7 @@ class AdaptiveSubscription:
         if offered != heard_by and not is_newer:
             return
         # 0 where the middleware has none, or ROS, before Kilted, does not say whose it is.
-        number = publisher and info.get('publication_sequence_number') or 0
+        number = (publisher and info.get('publication_sequence_number')) or 0
         before = self._newest.pop(publisher, number)
         self._newest[publisher] = max(number, before)
         self.lost += max(number - before - 1, 0)

@@ -189,7 +189,7 @@ class BagPlayer(PaintNode):
             message = 'resumed' if running else 'paused'
         else:
             message = 'not paused' if running else 'already paused'
-        return Trigger.Response(success=changes, message=message)
+        return Trigger.Response(success=True, message=message)
 
     def status(self) -> Status:
         if self._clock_publisher and self.count_publishers('/clock') > 1:

@@ -46,7 +46,7 @@ class PaintingNode(ManagedNode, ABC):
         mesh_file: the part's mesh; surface: the same, refined.
         zones: of its vertices, or None.
         points: the points that are painted.
-        models: the model with which each gun paints; files_in_use: their files, '' for the default.
+        models: with which each gun paints; files_in_use: their files, '' for the default.
         film: the film so far, by one gun or several.
         inputs: the subscriptions, one for each gun.
         repainting: films with other models, once a thread has compiled these and repainted the
