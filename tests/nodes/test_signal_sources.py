@@ -265,7 +265,7 @@ def test_a_value_of_the_future_counts_from_its_arrival(ros_context, monkeypatch)
 
     class Silent(OpcuaSource):
         def follow(self) -> None:
-            self.stopped.wait()
+            self.stop_requested.wait()
 
     node = Silent(context=ros_context, parameter_overrides=parameters(trigger='gun'))
     states: list[AtomizerState] = []

@@ -147,7 +147,7 @@ def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
     source.send_state(START_NS + 5, 0.5)
     if not are_lost:
         threading.Event().wait(2.1)  # nothing runs meanwhile
-    wait_until(lambda: recorder.leaving.counts.get('/atomizer/pose') == 10, what='late ones')
+    wait_until(lambda: recorder.run_before.counts.get('/atomizer/pose') == 10, what='late ones')
     wait_until(lambda: time.time_ns() > until_ns)
     source.send_pose(START_NS + 10, *place)
     source.send_state(START_NS + 10, 0.5)

@@ -260,7 +260,7 @@ def test_a_change_that_fails_is_none(simulated, painted, begin, wait_until, tmp_
     begin(prepare=True, mesh_file=str(large))
     aside = [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
     future = begin(serial='1', mesh_file=str(broken), part_pose=aside)
-    wait_until(lambda: node.parts.waiting, what='the request')
+    wait_until(lambda: node.parts.changing, what='the request')
     assert node.trigger_deactivate() == TransitionCallbackReturn.FAILURE
     refused = node.reset()
     assert not refused.success
@@ -290,7 +290,7 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
     before = SimpleNamespace(points=node.points, surface=node.surface)
     assert change(serial='0').success
     future = begin(serial='1', mesh_file=wider, part_pose=[0.0] * 6 + [1.0])
-    wait_until(lambda: node.parts.waiting, what='the request')
+    wait_until(lambda: node.parts.changing, what='the request')
     source.send(moved, slice(half, None), frame_id='cell')
     wait_until(future.done, what='the change')
     second = painted(node, len(moved) - half)
@@ -332,7 +332,7 @@ def test_poses_that_wait_are_of_their_part(simulator, robot, painted, begin, wai
     source.send(MOTION, frame_id='cell')
     wait_until(lambda: len(node.inputs[0].tf_queue) == len(MOTION), what='poses that wait')
     future = begin(serial='1')
-    wait_until(lambda: node.parts.waiting, what='the request')
+    wait_until(lambda: node.parts.changing, what='the request')
     source.send(later(MOTION))
     if placed:
         node.frame.tree.place('part', 'cell', [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])

@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed
-from paint_deposition.nodes.topics import POSE_DEPTH, header, pose_message
+from paint_deposition.nodes.topics import POSE_DEPTH, POSE_TOPIC, header, pose_message
 
 # What is read of EGM's messages: field, number and type of the wire format that ABB documents in
 # 3HAC073319 (EGM, sensor protocol); others are passed over.
@@ -219,7 +219,7 @@ class EgmSource(PaintNode):
             ) from None
         self._socket.settimeout(0.2)
         profile = QoSProfile(depth=POSE_DEPTH)
-        self._poses = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
+        self._poses = self.create_publisher(PoseStamped, POSE_TOPIC, profile)
         self._joints = self.create_publisher(JointState, 'joint_states', profile)
         self.stream = EgmStream(round(1e9 * self.values['lag_s']))
         self._heard_s, self._lacks = time.monotonic(), ''
@@ -237,7 +237,7 @@ class EgmSource(PaintNode):
         frame_id, names = self.values['frame_id'], self.values['joint_names']
         external = self.values['external_joints']
         with self._socket:
-            while not self.stopped.is_set():
+            while not self.stop_requested.is_set():
                 try:
                     packet, (sender, _) = self._socket.recvfrom(65_536)
                 except TimeoutError:

@@ -23,6 +23,8 @@ from visualization_msgs.msg import Marker
 
 from paint_deposition.files.recordings.messages import nanoseconds
 
+# Of a gun, whose name precedes them where there are several.
+POSE_TOPIC, STATE_TOPIC = 'atomizer/pose', 'atomizer/state'
 # On which every subscriber of the poses reports its progress.
 PROGRESS_TOPIC = 'atomizer/progress'
 PART_TOPIC = 'part'
@@ -146,7 +148,7 @@ class AdaptiveSubscription:
     def unsubscribe(self) -> None:
         """Take what is in the queues, and unsubscribe until the quality of service is matched.
 
-        What is sent meanwhile is not lost, and what is latched comes again.
+        What is sent meanwhile is not counted as lost; what is latched is received again.
         """
         for quality in [*self._subscriptions]:
             self._end(quality)

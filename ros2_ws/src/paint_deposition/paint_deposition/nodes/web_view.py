@@ -101,7 +101,7 @@ class WebView(PaintNode):
             )
             for name in names
             for message, topic in (
-                (AtomizerState, 'atomizer/state'), (PoseStamped, 'atomizer/pose'),
+                (AtomizerState, topics.STATE_TOPIC), (PoseStamped, topics.POSE_TOPIC),
             )
         ]  # fmt: skip
         # At 1 kHz fifty poses wait at most.
@@ -138,7 +138,7 @@ class WebView(PaintNode):
             try:
                 self.require_named_folder(part.mesh_file)
                 self._show_part(part.mesh_file)
-            except (PaintError, MemoryError) as error:
+            except (PaintError, OSError, MemoryError) as error:
                 self._say(str(error) or 'not enough memory')
                 return
         serial = f'{part.serial}, ' if part.serial else ''

@@ -16,7 +16,7 @@ from paint_deposition.nodes.painting.atomizer_input import (
     STATES_REFUSED,
     AtomizerInput,
 )
-from paint_deposition.nodes.topics import gun_topic
+from paint_deposition.nodes.topics import STATE_TOPIC, gun_topic
 
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.painting_node import PaintingNode
@@ -81,7 +81,7 @@ def poses_status(node: PaintingNode, number: int) -> Status:
             return WARN, words, values
         return OK, 'inactive', values
     # A Bool, say, which nobody hears.
-    topic, unheard = gun_topic(source.name, 'atomizer/state'), ''
+    topic, unheard = gun_topic(source.name, STATE_TOPIC), ''
     for info in node.get_publishers_info_by_topic(node.resolve_topic_name(topic)):
         if info.topic_type != STATE_TYPE:
             unheard = (
