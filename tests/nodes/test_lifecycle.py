@@ -116,8 +116,7 @@ def test_a_shutdown_waits_for_an_answer(simulator, manager, viewer, asked, wait_
     assert managed('shutdown') == (True, 'finalized')
     assert not node.active
     disk.set()
-    wait_until(lambda: not node.configured, what='the end')
-    wait_until(saved.done, what='the answer')
+    wait_until(lambda: saved.done() and not node.configured, what='the answer and the end')
     assert saved.result().success
 
 
@@ -176,9 +175,7 @@ def test_an_unforeseen_error_ends_unconfigured(start, ros_context, manager, view
         Faulty(context=ros_context)
 
 
-def test_each_activation_is_a_whole_run(
-    record, robot, manager, viewer, call, wait_until, tmp_path
-):
+def test_each_activation_is_a_whole_run(record, robot, manager, call, wait_until, tmp_path):
     recorder = record(autostart=False)
     managed = manager(recorder)
     source = robot()
@@ -206,7 +203,7 @@ def test_each_activation_is_a_whole_run(
     assert len(list(tmp_path.glob('run*'))) == 2
     first = read_recording(tmp_path / 'run', None, '/atomizer/state')
     assert first.trigger_flow.tolist() == [0.5, 1.0]
-    assert call(viewer, Trigger, '/run_recorder/stop').success
+    assert call(source, Trigger, '/run_recorder/stop').success
     assert managed('shutdown') == (True, 'finalized')
     wait_until(recorder.finished.done, what='the end of the process', timeout_s=5.0)
 

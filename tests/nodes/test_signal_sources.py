@@ -262,12 +262,8 @@ def test_values_from_before_a_connection_are_not_called_late(ros_context):
 
 def test_a_value_of_the_future_counts_from_its_arrival(ros_context, monkeypatch):
     """The first, too, which may be old."""
-
-    class Silent(OpcuaSource):
-        def follow(self) -> None:
-            self.stop_requested.wait()
-
-    node = Silent(context=ros_context, parameter_overrides=parameters(trigger='gun'))
+    chosen = parameters(trigger='gun', url='opc.tcp://127.0.0.1:9')  # nobody is there
+    node = OpcuaSource(context=ros_context, parameter_overrides=chosen)
     states: list[AtomizerState] = []
     (publisher,) = (p for p in node.publishers if p.topic_name == '/atomizer/state')
     monkeypatch.setattr(publisher, 'publish', states.append)

@@ -183,10 +183,7 @@ def test_the_clock_runs_on_through_a_gap(play, listen, onlooker, wait_until, tmp
 
 @pytest.mark.parametrize('rate', [1.0, 0.0])
 def test_the_clock_stands_meanwhile(play, listen, onlooker, call, wait_until, pass_bag, rate):
-    """Before the start and while paused, also for who comes late; it runs with the first pose.
-
-    No pose is sent meanwhile, nor lost.
-    """
+    """Before the start and while paused, also for who comes late; no pose is lost by that."""
 
     def watch():
         viewer = onlooker('/clock')

@@ -71,9 +71,7 @@ def test_the_first_gun_decides_which_side_is_outward(simulator, guns, painted, w
     assert np.array_equal(node.film.snapshot().film_um, offline_um(node, HIGH))
 
 
-def test_a_model_that_lacks_a_brush_of_one_gun_is_used_by_none(
-    simulator, guns, wait_until, tmp_path
-):
+def test_no_gun_uses_a_model_that_another_refuses(simulator, guns, wait_until, tmp_path):
     both, files = two_brushes(), [str(tmp_path / name) for name in ('both.yaml', 'one.yaml')]
     for file, brushes in zip(files, (both.brushes, both.brushes[:1]), strict=True):
         pd.write_model(file, pd.DepositionModel(brushes=brushes))
