@@ -284,14 +284,15 @@ def legend(scale: ColourScale, surface: Surface, frame_id: str) -> MarkerArray:
         r, g, b, a = (scale.palette[step * TABLE // steps] / 255.0).tolist()
         for right, over in ((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)):
             place = corner + 0.04 * size * right * across + size * (step + over) / steps * up
-            bar.points.append(Point(**dict(zip('xyz', place.tolist(), strict=True))))
+            x, y, z = place.tolist()
+            bar.points.append(Point(x=x, y=y, z=z))
             bar.colors.append(ColorRGBA(r=r, g=g, b=b, a=a))
     markers = [bar]
     for number, share in enumerate(np.linspace(0.0, 1.0, 5), start=1):
         label = white_marker(Marker.TEXT_VIEW_FACING, 'legend', number, frame_id)
         label.text = f'{scale.low + (scale.high - scale.low) * share:g} µm'
         label.scale = Vector3(z=0.04 * size)
-        place = corner + share * size * up + 0.1 * size * across
-        label.pose.position = Point(**dict(zip('xyz', place.tolist(), strict=True)))
+        x, y, z = (corner + share * size * up + 0.1 * size * across).tolist()
+        label.pose.position = Point(x=x, y=y, z=z)
         markers.append(label)
     return MarkerArray(markers=markers)
