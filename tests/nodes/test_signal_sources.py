@@ -167,7 +167,6 @@ def test_signals_of_a_controller_switch_the_gun(start, states, wait_until):
 
 
 def test_a_controller_that_is_silent_does_not_hold_up_the_end(start, wait_until, monkeypatch):
-    """It takes the connection for the events, and says nothing on it."""
     monkeypatch.setattr(controllers, 'TIMEOUT_S', 0.5)
     controller = Controller()
     with socket.create_server(('127.0.0.1', 0)) as silent, controller.running() as url:

@@ -101,7 +101,8 @@ def test_each_part_has_its_film_and_its_run(
         # The second begins with the state in which the gun was left.
         assert messages['/atomizer/state'] == len(motion.triggers) + number
         assert messages['/thickness/field']
-        assert f'serial: 47-{number}' in (run / 'metadata.yaml').read_text()
+        told = (run / 'metadata.yaml').read_text()
+        assert [w in told for w in (f'serial: 47-{number}', 'mesh_id', 'sha256')] == [1, 1, 0]
         assert saved_um(run / 'film.csv') == pytest.approx(film, rel=1e-7)
         figures = json.loads((run / 'film.json').read_text())
         described = {'serial': f'47-{number}', 'type': 'door', 'coat': 1}
