@@ -151,12 +151,10 @@ def test_launch_file_describes_every_node_and_leaves_the_rest_to_a_file_of_ones_
         assert told.items() <= nodes['bag_player'].items()
     # A replay waits for every node that takes poses.
     for given, count in (
-        ({}, 1),
-        ({'record': 'runs'}, 2),
-        ({'measurements': "painter's.csv"}, 2),
+        ({}, 1), ({'record': 'runs'}, 2), ({'measurements': "painter's.csv"}, 2),
         ({'record': '1', 'measurements': 'readings.csv', 'page': 'true'}, 4),
         ({'wait_for_subscribers': '5'}, 5),
-    ):
+    ):  # fmt: skip
         assert wanted(bag='run', **given)['bag_player']['wait_for_subscribers'] == count
 
 

@@ -29,7 +29,10 @@ def entered():
         if event != 'call' or not file.startswith(package):
             return
         name = file.removeprefix(package)
-        if name not in found and not is_importing(frame):
+        # What runs while a file is imported does not count.
+        while frame and name not in found and '<frozen importlib' not in frame.f_code.co_filename:
+            frame = frame.f_back
+        if frame is None:
             found[name] = None
 
     threading.setprofile(note)
@@ -37,13 +40,6 @@ def entered():
     yield found
     sys.setprofile(None)
     threading.setprofile(None)
-
-
-def is_importing(frame) -> bool:
-    """Whether the call is of what runs while a file is imported."""
-    while frame is not None and not frame.f_code.co_filename.startswith('<frozen importlib'):
-        frame = frame.f_back
-    return frame is not None
 
 
 def journey(repository: Path, name: str) -> list[str]:

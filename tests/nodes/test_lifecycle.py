@@ -9,10 +9,12 @@ from geometry_msgs.msg import PoseStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from paint_msgs.srv import SaveFilm
+from std_srvs.srv import Trigger
 
 from nodes.cell import offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.nodes.managed_node import ManagedNode
+from paint_deposition.nodes.node import OK
 from scenes import rows_of
 
 MOTION = two_passes()
@@ -102,6 +104,22 @@ def test_what_callbacks_replace_stays_until_cleanup(
     wait_until(lambda: not any(source.has_subscribers(1) for source in robots))
 
 
+def test_a_shutdown_waits_for_an_answer(simulator, manager, viewer, asked, wait_until):
+    """It cannot be refused, as another step is; the node paints no more meanwhile."""
+    node, disk = simulator(), threading.Event()
+    managed = manager(node)
+    node._saving.submit(disk.wait, 10.0)
+    saved = asked(viewer, SaveFilm, '/deposition_simulator/save_film', name='held')
+    wait_until(lambda: node.awaiting, what='the request')
+    assert managed('deactivate') == (False, 'active')
+    assert node.tasks['state']() == (OK, 'active', {})
+    assert managed('shutdown') == (True, 'finalized')
+    assert not node.active
+    disk.set()
+    wait_until(lambda: saved.done() and not node.configured, what='the answer and the end')
+    assert saved.result().success
+
+
 def test_what_it_reads_may_change_unconfigured(simulator, manager, viewer, wait_until, tmp_path):
     """A part that cannot be read leaves it unconfigured, and it says so."""
     (tmp_path / 'late.stl').write_text('no mesh')
@@ -157,12 +175,16 @@ def test_an_unforeseen_error_ends_unconfigured(start, ros_context, manager, view
         Faulty(context=ros_context)
 
 
-def test_each_activation_is_a_whole_run(record, robot, manager, wait_until, tmp_path):
+def test_each_activation_is_a_whole_run(record, robot, manager, call, wait_until, tmp_path):
     recorder = record(autostart=False)
     managed = manager(recorder)
     source = robot()
     assert managed('configure') == (True, 'inactive')
     assert not list(tmp_path.iterdir())
+    # What comes once, before there is a run, stays in force.
+    wait_until(source.state_publisher.get_subscription_count, what='the subscription')
+    source.send_state(MOTION.stamps_ns[0] - 1, 0.5)
+    wait_until(lambda: recorder.recorded['/atomizer/state'].messages, what='the state')
     # A run that is there is not overwritten.
     (tmp_path / 'run').mkdir()
     assert managed('activate') == (False, 'inactive')
@@ -179,7 +201,11 @@ def test_each_activation_is_a_whole_run(record, robot, manager, wait_until, tmp_
         assert np.array_equal(recorded.stamps_ns, MOTION.stamps_ns[rows])
         wait_until(lambda: not source.pose_publisher.get_subscription_count())
     assert len(list(tmp_path.glob('run*'))) == 2
+    first = read_recording(tmp_path / 'run', None, '/atomizer/state')
+    assert first.trigger_flow.tolist() == [0.5, 1.0]
+    assert call(source, Trigger, '/run_recorder/stop').success
     assert managed('shutdown') == (True, 'finalized')
+    wait_until(recorder.finished.done, what='the end of the process', timeout_s=5.0)
 
 
 @pytest.mark.parametrize('kind', ['simulator', 'record'])

@@ -9,15 +9,12 @@ from std_srvs.srv import Trigger
 
 from nodes.cell import parameters, saved_um, two_passes, write_own_model
 from nodes.processes import NodeProcess, recorder_process, simulator_process
-from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.nodes import topics
 from paint_deposition.nodes.topics import TRUST_TOPIC, header
-from scenes import painted
 
-EDGE_M = 0.03
-COARSE = {'max_edge_length_m': EDGE_M}
+COARSE = {'max_edge_length_m': 0.03}
 POSES = 1500
 MOTION = two_passes(poses=POSES, trigger=False)
 STATS, PROGRESS = 'thickness/stats', 'atomizer/progress'
@@ -44,36 +41,24 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
     assert len(read_recording(tmp_path / 'run')) == 300
-    live_um = saved_um(tmp_path / 'film.csv')
-    surface = read_mesh(tmp_path / 'panel.stl', 1.0, EDGE_M)
-    motion = read_recording(bag, None, '/atomizer/state')
-    expected_um = painted(surface.points(), motion, None, 'double', surface).film_um
-    assert expected_um.max() > 1.0
-    assert np.abs(live_um - expected_um).max() < 1e-6 * expected_um.max()
+    assert saved_um(tmp_path / 'film.csv').max() > 1.0
 
 
-def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(asked, onlooker, wait_until, tmp_path):
-    films = tmp_path / 'films'
-    fine = {'max_edge_length_m': 0.004, 'output_directory': films}
+def test_ctrl_c_lets_a_film_be_saved(asked, call, onlooker, wait_until, tmp_path):
+    """And ends the trial of an effect, which would never end."""
+    films, user = tmp_path / 'films', onlooker()
+    fine = {'max_edge_length_m': 0.004, 'output_directory': films, 'allow_user_effects': True}
     with simulator_process(tmp_path, **fine) as simulator:
-        asked(onlooker(), SaveFilm, '/deposition_simulator/save_film', name='film')
+        own = parameters(model_file=str(write_own_model(tmp_path)))[0].to_parameter_msg()
+        service = SetParameters, '/deposition_simulator/set_parameters'
+        answer = call(user, *service, parameters=[own])
+        assert answer.results[0].successful, answer.results[0].reason
+        asked(user, SaveFilm, '/deposition_simulator/save_film', name='film')
         wait_until(lambda: films.is_dir() and any(films.iterdir()), what='the first file')
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
         assert 'Traceback' not in simulator.err
     assert {path.name for path in films.iterdir()} == {'film.ply', 'film.csv', 'film.json'}
-
-
-def test_ctrl_c_while_a_model_is_prepared_ends_it(onlooker, call, tmp_path):
-    """The trial of this effect would never end."""
-    own = write_own_model(tmp_path)
-    with simulator_process(tmp_path, allow_user_effects=True) as simulator:
-        (change,) = (p.to_parameter_msg() for p in parameters(model_file=str(own)))
-        service = SetParameters, '/deposition_simulator/set_parameters'
-        answer = call(onlooker(), *service, parameters=[change])
-        assert answer.results[0].successful, answer.results[0].reason
-        simulator.interrupt_as_launch_does()
-        assert simulator.wait() == 0, simulator.err
 
 
 def test_a_stall_loses_nothing(robot, wait_until, onlooker, tmp_path):

@@ -155,3 +155,6 @@ def test_readings_with_normals_on_a_sheet_that_is_wound_inward(
     else:
         told = 'the gun paints the other side of the part'
         wait_until(lambda: viewer.reports('model_comparison: film', told, b'\x01'), what=told)
+        assert node.set_parameters_atomically(parameters(model_file='')).successful
+        wait_until(lambda: not node.repainting, what='the model')
+        assert told in node.tasks['film']()[1]

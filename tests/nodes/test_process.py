@@ -19,12 +19,6 @@ from paint_deposition.nodes.parameters import NodeParameter
 from paint_deposition.nodes.node import PaintNode, run_node
 
 
-def take(time_s):
-    start = time.monotonic()
-    while time.monotonic() < start + time_s:
-        pass
-
-
 class Worker(PaintNode):
     NAME = 'worker'
     PARAMETERS = {'does': NodeParameter('run', 'What it does [word]')}
@@ -59,11 +53,11 @@ class Worker(PaintNode):
             raise ZeroDivisionError('never mind')
         if does == 'work':
             print('working', flush=True)
-            take(0.5)
+            time.sleep(0.5)
             Path('worked').touch()
 
     def close(self):
-        take(0.3)
+        time.sleep(0.3)
         print('closed', flush=True)
 
 

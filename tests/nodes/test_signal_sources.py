@@ -24,6 +24,7 @@ from websockets.sync.server import serve
 from nodes.cell import free_port, parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.messages import stamp_ns
+from paint_deposition.nodes import controllers
 from paint_deposition.nodes.controllers import OpcuaSource, RwsSource
 
 GUN, FLOW = 'EtherNetIP/Gun/doGun', 'EtherNetIP/Gun/aoFlow'
@@ -49,7 +50,7 @@ class Controller:
     def __init__(self) -> None:
         self.subscribed: dict[str, list[str]] = {}
         self.socket = None
-        self.cookie, self.host, self.sessions = '', '127.0.0.1', 0
+        self.cookie, self.events, self.sessions = '', '', 0
 
     def tell(self, **values: float) -> None:
         self.socket.send(event(**values))
@@ -70,7 +71,7 @@ class Controller:
                 controller.subscribed = parse_qs(body)
                 controller.sessions += 1
                 self.send_response(201)
-                self.send_header('Location', f'ws://{controller.host}:{port}/poll/1')
+                self.send_header('Location', controller.events or f'ws://127.0.0.1:{port}/poll/1')
                 self.send_header('Set-Cookie', 'ABBCX=21; path=/')
                 self.end_headers()
                 self.wfile.write(event(gun=0, flow=0).encode())
@@ -165,9 +166,21 @@ def test_signals_of_a_controller_switch_the_gun(start, states, wait_until):
         wait_until(lambda: controller.sessions == 0, what='the end of the session')
 
 
+def test_a_controller_that_is_silent_does_not_hold_up_the_end(start, wait_until, monkeypatch):
+    monkeypatch.setattr(controllers, 'TIMEOUT_S', 0.5)
+    controller = Controller()
+    with socket.create_server(('127.0.0.1', 0)) as silent, controller.running() as url:
+        controller.events = f'ws://127.0.0.1:{silent.getsockname()[1]}/poll/1'
+        node = start(RwsSource, url=url, trigger='doGun', flow=FLOW)
+        wait_until(lambda: controller.sessions, what='the session')
+        began_s = time.monotonic()
+        node.close()
+        assert time.monotonic() - began_s < 5.0
+
+
 def test_the_cookie_of_a_controller_goes_to_no_other_host(start, states, wait_until):
     controller = Controller()
-    controller.host = 'localhost'
+    controller.events = 'ws://localhost:1/poll/1'
     with controller.running() as url:
         start(RwsSource, url=url, trigger='doGun', flow=FLOW)
         wait_until(lambda: states.reports('rws_source: signals', 'another host', b'\x02'))
@@ -248,12 +261,8 @@ def test_values_from_before_a_connection_are_not_called_late(ros_context):
 
 def test_a_value_of_the_future_counts_from_its_arrival(ros_context, monkeypatch):
     """The first, too, which may be old."""
-
-    class Silent(OpcuaSource):
-        def follow(self) -> None:
-            self.stopped.wait()
-
-    node = Silent(context=ros_context, parameter_overrides=parameters(trigger='gun'))
+    chosen = parameters(trigger='gun', url='opc.tcp://127.0.0.1:9')  # nobody is there
+    node = OpcuaSource(context=ros_context, parameter_overrides=chosen)
     states: list[AtomizerState] = []
     (publisher,) = (p for p in node.publishers if p.topic_name == '/atomizer/state')
     monkeypatch.setattr(publisher, 'publish', states.append)

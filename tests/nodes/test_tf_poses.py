@@ -12,9 +12,6 @@ from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.motion.transforms import Rigid
 from paint_deposition.nodes.atomizer_source import AtomizerSource
 
-needs_tf = pytest.mark.skipif(
-    importlib.util.find_spec('tf2_msgs') is None, reason='tf2 comes with a ROS installation'
-)
 STEP_NS = 4_000_000
 FLANGE = Rigid.of([0.0, 0.1, 0.3, *Rotation.from_euler('x', 30.0, degrees=True).as_quat()])
 TCP = [0.0, 0.02, 0.15, *Rotation.from_euler('y', 25.0, degrees=True).as_quat()]
@@ -27,6 +24,7 @@ def viewer(onlooker):
 
 @pytest.fixture
 def broadcaster(start, ros_context, spin, viewer, wait_until):
+    pytest.importorskip('tf2_msgs', reason='tf2 comes with a ROS installation')
     start(AtomizerSource, base_link='world', tcp_offset=TCP)
     sender = Broadcaster(ros_context)
     spin(sender)
@@ -59,7 +57,6 @@ def told(viewer) -> str:
     return status.message if status else ''
 
 
-@needs_tf
 def test_poses_of_the_bell_have_the_stamps_of_transforms(broadcaster, viewer, wait_until):
     """A rail that tells its place at a fifth of the arm's rate, and late."""
     broadcaster.send(START_NS, static=True, flange_to_tool0=FLANGE)
@@ -79,7 +76,6 @@ def test_poses_of_the_bell_have_the_stamps_of_transforms(broadcaster, viewer, wa
     wait_until(lambda: told(viewer) == 'following the robot')
 
 
-@needs_tf
 def test_a_stream_that_begins_again_is_followed(broadcaster, viewer, wait_until):
     broadcaster.send(START_NS, static=True, world_to_foot=rail(START_NS), flange_to_tool0=FLANGE)
     stamps = [START_NS + 10_000_000_000, START_NS]
@@ -90,7 +86,6 @@ def test_a_stream_that_begins_again_is_followed(broadcaster, viewer, wait_until)
     assert poses(viewer)[0] == [first + STEP_NS * row for first in stamps for row in range(5)]
 
 
-@needs_tf
 def test_a_frame_that_is_not_there_is_named(broadcaster, viewer, wait_until):
     broadcaster.send(START_NS, foot_to_tool=arm(START_NS))
     wait_until(lambda: told(viewer) == "tf has no frame 'tool0'; did you mean 'tool'?")

@@ -172,15 +172,12 @@ def test_predictions_are_written_beside_the_columns_of_the_file(tmp_path):
 def test_spreadsheet(tmp_path):
     """Title rows, numbers as numbers and as text with a comma, a second sheet without readings."""
     rows = [
-        ['Türaußenhaut, Los 17'],
-        [],
+        ['Türaußenhaut, Los 17'], [],
         [None, 'Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke (µm)', 'i.O.?'],
-        [None, 'A1', 100, 0, 50, 21.5, 'ja'],
-        [None, 'A1', 100, 0, 50, '22,1', 'ja'],
-        [None, 'A2', 100, 0, 200, 24, 'ja'],
-        [None, 'A3', 250, 0, 350, '19,4', 'nein'],
+        [None, 'A1', 100, 0, 50, 21.5, 'ja'], [None, 'A1', 100, 0, 50, '22,1', 'ja'],
+        [None, 'A2', 100, 0, 200, 24, 'ja'], [None, 'A3', 250, 0, 350, '19,4', 'nein'],
         [None, 'Mittelwert', None, None, None, 21.75],
-    ]
+    ]  # fmt: skip
     path = tmp_path / 'tuer.xlsx'
     write_workbook(path, {'Deckblatt': [['Kunde', 'Werk 3']], 'Messung': rows})
     readings = read_readings(path)

@@ -23,6 +23,7 @@ from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.nodes.node import ERROR, OK
 from paint_deposition.nodes.topics import AdaptiveSubscription
+from paint_deposition.nodes.web_view import WebView
 
 LATER_NS = 60_000_000_000
 OPEN = two_passes(poses=300)
@@ -100,7 +101,8 @@ def test_each_part_has_its_film_and_its_run(
         # The second begins with the state in which the gun was left.
         assert messages['/atomizer/state'] == len(motion.triggers) + number
         assert messages['/thickness/field']
-        assert f'serial: 47-{number}' in (run / 'metadata.yaml').read_text()
+        told = (run / 'metadata.yaml').read_text()
+        assert [w in told for w in (f'serial: 47-{number}', 'mesh_id', 'sha256')] == [1, 1, 0]
         assert saved_um(run / 'film.csv') == pytest.approx(film, rel=1e-7)
         figures = json.loads((run / 'film.json').read_text())
         described = {'serial': f'47-{number}', 'type': 'door', 'coat': 1}
@@ -131,9 +133,12 @@ def test_the_gun_and_its_brush_stay(simulated, painted, change, wider, wait_unti
     assert painted(node, len(WITHOUT_TRIGGER)).max() == 0.0
 
 
-def test_meshes_are_read_once_for_each_shape_they_have(simulator, change, wider, tmp_path):
+def test_meshes_are_read_once_for_each_shape_they_have(
+    simulator, closed, change, wider, wait_until, tmp_path
+):
     """Read ahead, or of a part that has left; one that was exported anew is read again."""
     node = simulator()
+    page = closed(WebView, mesh_file=node.mesh_file, max_edge_length_m=0.05, port=0)
     first, third = node.mesh_file, str(write_panel(tmp_path / 'third.stl', reverse=True))
     prepared = change(mesh_file=third, prepare=True)
     assert (prepared.success, node.mesh_file) == (True, first)
@@ -152,6 +157,7 @@ def test_meshes_are_read_once_for_each_shape_they_have(simulator, change, wider,
     narrow = Path(first).read_bytes()
     shutil.copy(wider, first)
     assert change(serial='4').success
+    wait_until(lambda: node.surface.mesh_id in page._mesh_ids, what='the page')
     assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(1.3 * PANEL_M)
     Path(first).write_bytes(narrow)
     assert change(serial='5', mesh_file=wider).success
@@ -222,7 +228,7 @@ def test_a_film_is_kept_until_it_is_on_disk(simulated, painted, change, tmp_path
         assert node.trigger_cleanup() == TransitionCallbackReturn.FAILURE
     assert node.configured
     unsaved = 'films of 1 former parts are not saved'
-    assert unsaved in node.tasks['state']()[1]
+    assert unsaved in node.parts.status()[1]
     node.trigger_activate()
     second = change(serial='2')
     assert (second.success, second.run, second.paths) == (True, '2', [])
@@ -235,9 +241,14 @@ def test_a_film_is_kept_until_it_is_on_disk(simulated, painted, change, tmp_path
     assert [Path(path).parent.name for path in third.paths] == 3 * ['1'] + 3 * ['2']
     assert saved_um(folder / '1/film.csv') == pytest.approx(film, rel=1e-7)
     assert node.parts.status()[0] == OK
-    node.trigger_deactivate()
-    assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
+    # Who shuts the node down is told of the film that is lost.
+    source.send(later(later(MOTION)))
+    painted(node, len(MOTION))
+    shutil.rmtree(folder)
+    folder.write_text('in the way')
+    assert node.trigger_shutdown() == TransitionCallbackReturn.FAILURE
     assert not node.configured
+    assert 'films of 1 former parts are not saved' in node.tasks['state']()[1]
 
 
 @pytest.mark.parametrize(('pose', 'frame'), [([], 'part'), ([0.0] * 6 + [1.0], 'cell')])
@@ -250,10 +261,8 @@ def test_a_change_that_fails_is_none(simulated, painted, begin, wait_until, tmp_
     begin(prepare=True, mesh_file=str(large))
     aside = [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
     future = begin(serial='1', mesh_file=str(broken), part_pose=aside)
-    wait_until(lambda: node.parts.waiting, what='the request')
-    for step in (node.trigger_deactivate, node.trigger_cleanup):
-        assert step() != TransitionCallbackReturn.SUCCESS
-    assert node.active
+    wait_until(lambda: node.parts.changing, what='the request')
+    assert node.trigger_deactivate() == TransitionCallbackReturn.FAILURE
     refused = node.reset()
     assert not refused.success
     assert refused.message == 'the part is being changed: call again after it'
@@ -282,7 +291,7 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
     before = SimpleNamespace(points=node.points, surface=node.surface)
     assert change(serial='0').success
     future = begin(serial='1', mesh_file=wider, part_pose=[0.0] * 6 + [1.0])
-    wait_until(lambda: node.parts.waiting, what='the request')
+    wait_until(lambda: node.parts.changing, what='the request')
     source.send(moved, slice(half, None), frame_id='cell')
     wait_until(future.done, what='the change')
     second = painted(node, len(moved) - half)
@@ -324,7 +333,7 @@ def test_poses_that_wait_are_of_their_part(simulator, robot, painted, begin, wai
     source.send(MOTION, frame_id='cell')
     wait_until(lambda: len(node.inputs[0].tf_queue) == len(MOTION), what='poses that wait')
     future = begin(serial='1')
-    wait_until(lambda: node.parts.waiting, what='the request')
+    wait_until(lambda: node.parts.changing, what='the request')
     source.send(later(MOTION))
     if placed:
         node.frame.tree.place('part', 'cell', [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])

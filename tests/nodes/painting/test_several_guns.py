@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import paint_deposition as pd
-from nodes.cell import offline_um, turned, two_passes
+from brushes import two_brushes
+from nodes.cell import offline_um, parameters, turned, two_passes
 from paint_deposition.files.motion_files import read_gun_motions
 from paint_deposition.request import MotionOptions
 
@@ -68,6 +69,20 @@ def test_the_first_gun_decides_which_side_is_outward(simulator, guns, painted, w
     painted(node, len(behind) + len(HIGH))
     wait_until(lambda: node.surface.outward[1] < 0.0, what='the part turned to the first gun')
     assert np.array_equal(node.film.snapshot().film_um, offline_um(node, HIGH))
+
+
+def test_no_gun_uses_a_model_that_another_refuses(simulator, guns, wait_until, tmp_path):
+    both, files = two_brushes(), [str(tmp_path / name) for name in ('both.yaml', 'one.yaml')]
+    for file, brushes in zip(files, (both.brushes, both.brushes[:1]), strict=True):
+        pd.write_model(file, pd.DepositionModel(brushes=brushes))
+    node = simulator(atomizers=GUNS, model_file=files[0], repaint=False)
+    for number, gun in enumerate(guns(node), start=1):
+        gun.send_state(HIGH.stamps_ns[0], 1.0, brush=number)
+    wait_until(lambda: all(source.spraying for source in node.inputs), what='the states')
+    node.set_parameters(parameters(model_file=files[1]))
+    wait_until(lambda: not node.repainting, what='the end of the trial')
+    assert 'brush 2 is not in the model' in node.model_problem
+    assert [gun.model for gun in node.film.guns] == [both, both]
 
 
 def test_the_film_is_the_sum_of_guns(simulator, record, guns, wait_until, painted, play, tmp_path):

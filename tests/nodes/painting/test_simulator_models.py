@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from paint_msgs.srv import ChangePart
 
 import paint_deposition as pd
 from brushes import switched, two_brushes
@@ -13,7 +14,7 @@ from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.errors import ModelError
 from refusals import refusal
 
-MOTION = two_passes()
+MOTION, SPRAYING = two_passes(), two_passes(trigger=False)
 # One effect that acts on each ray, and one that needs whole strokes.
 MODEL = pd.DepositionModel(
     effects=tuple(effect_class(i).typical() for i in ('incidence_attraction', 'corner_slowdown'))
@@ -60,21 +61,28 @@ def test_a_new_model_paints_the_motion_so_far_again(simulated, painted, wait_unt
     assert np.array_equal(painted(node), offline_um(node, MOTION, MODEL))
 
 
-def test_an_effect_holds_up_no_pose(simulated, painted, onlooker, wait_until, set_model, tmp_path):
+def test_an_effect_holds_up_no_pose(
+    simulated, painted, onlooker, call, wait_until, set_model, tmp_path
+):
     """Neither compiling it nor using it may hold up the executor."""
     own = write_own_model(tmp_path)
     (node, source), viewer = simulated(allow_user_effects=True), onlooker()
-    source.send(MOTION, slice(0, 300))
+    source.send(SPRAYING, slice(0, 300))
     painted(node, 300)
     set_model(node, own)
-    source.send(MOTION, slice(300, None))
+    source.send(SPRAYING, slice(300, None))
     film = painted(node)
     assert node.repainting
-    assert np.array_equal(film, offline_um(node, MOTION))
+    assert np.array_equal(film, offline_um(node, SPRAYING))
+    # Nor may it be used before it was tried out, on a part that comes meanwhile.
+    change = '/deposition_simulator/change_part'
+    assert call(viewer, ChangePart, change, serial='1').success
+    source.send(SPRAYING)
+    assert np.array_equal(painted(node), film)
     (tmp_path / 'gate').touch()
     wait_until(lambda: not node.repainting, what='repainting')
     painted_anew = node.film.snapshot().film_um
-    assert np.array_equal(painted_anew, offline_um(node, MOTION, pd.read_model(own)))
+    assert np.array_equal(painted_anew, offline_um(node, SPRAYING, pd.read_model(own)))
     # Within 45 degrees of the axis the factor is 1.35 to 1.5.
     assert 1.2 < painted_anew.max() / film.max() <= 1.5
 
@@ -142,7 +150,7 @@ def test_a_brush_of_no_model_is_refused(simulated, painted, onlooker, wait_until
     """The paint of such a state is not painted, nor any before a state names a brush."""
     pd.write_model(tmp_path / 'brushes.yaml', BRUSHES)
     (node, source), viewer = simulated(model_file=str(tmp_path / 'brushes.yaml')), onlooker()
-    source.send(two_passes(trigger=False))
+    source.send(SPRAYING)
     assert painted(node).max() == 0.0
     wait_until(lambda: viewer.reports(POSES, 'no state names one of the brushes yet'))
     node.reset()

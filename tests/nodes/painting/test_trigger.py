@@ -82,16 +82,13 @@ def test_robots_are_heard_as_they_send(simulator, robot, painted, wait_until, st
     wait_until(lambda: second.pose_publisher.get_subscription_count(), what='best effort')
     second.send(UNTRIGGERED, slice(300, 310))
     wait_until(lambda: node.film.counts.received > 300, what='poses of best effort')
-
-    def reliability() -> list[ReliabilityPolicy]:
-        inputs = [s for s in node.subscriptions if s.topic_name == '/atomizer/pose']
-        return [each.qos_profile.reliability for each in inputs]
-
-    assert reliability() == [ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT]
+    hears = lambda: [s for s in node.subscriptions if s.topic_name == '/atomizer/pose']  # noqa: E731
+    qualities = [ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT]
+    assert [each.qos_profile.reliability for each in hears()] == qualities
     second.destroy_node()
     # Poses go on while it leaves, and each of them counts once.
     row = 310
-    while reliability() != [ReliabilityPolicy.RELIABLE]:
+    while len(hears()) > 1:
         first.send(UNTRIGGERED, slice(row, row + 1))
         row += row < 599
         still(0.01)
@@ -112,15 +109,19 @@ def test_no_more_is_asked_for(simulator, robot, onlooker, wait_until, capfd):
     assert not {'[WARN]', '[ERROR]'} & set(said.split())
 
 
-def test_a_bool_as_the_state_is_an_error(simulator, onlooker, ros_domain, wait_until):
+def test_a_bool_as_the_state_is_an_error(simulator, onlooker, ros_domain, wait_until, capfd):
     """It cannot be heard, and the gun would count as always on."""
-    simulator()
+    guns = ['left', 'right']
+    simulator(atomizers=guns)
     viewer, apart = onlooker(), Context()  # one participant has one type for a topic
     rclpy.init(context=apart, domain_id=ros_domain)
     controller = Node('plc', context=apart)
-    controller.create_publisher(Bool, 'atomizer/state', 10)
-    told = 'atomizer/state comes as std_msgs/msg/Bool and does not switch the gun'
-    wait_until(lambda: viewer.reports(POSES, told, b'\x02'))
+    for gun in guns:
+        controller.create_publisher(Bool, f'{gun}/atomizer/state', 10)
+        told = f'{gun}/atomizer/state comes as std_msgs/msg/Bool and does not switch the gun'
+        task = f'deposition_simulator: {gun}/poses'
+        wait_until(lambda name=task, said=told: viewer.reports(name, said, b'\x02'), what=told)
+        assert capfd.readouterr().err.count(told) == 1
     controller.destroy_node()
     apart.try_shutdown()
 

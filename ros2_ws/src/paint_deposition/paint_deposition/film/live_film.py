@@ -204,14 +204,14 @@ class LiveFilm:
             self._snapshot.add(copy.deepcopy(self._builder).take(finish=True))
         return self._snapshot
 
-    def switch_model(self, model: DepositionModel) -> None:
-        """Paint with another model from here on; the film so far stays.
-
-        Raises:
-            ModelError: the model lacks a brush that was used.
-        """
+    def require_brushes_in(self, model: DepositionModel) -> None:
+        """Refuse by ModelError a model that lacks a brush that was used."""
         always_on = len(self.model.brushes) <= 1 and self.flow is None
         model.require_brushes({ONLY_BRUSH} if always_on else self._brushes)
+
+    def switch_model(self, model: DepositionModel) -> None:
+        """Paint with another model, which has the brushes used, from here on; the film stays."""
+        self.require_brushes_in(model)
         builder = self._builder
         self._integrator.add(builder.take(self._settled_ns, finish=True))
         self._integrator.use(model)

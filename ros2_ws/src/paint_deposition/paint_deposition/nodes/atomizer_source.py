@@ -26,6 +26,8 @@ from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed, requested
 from paint_deposition.nodes.topics import (
     POSE_DEPTH,
+    POSE_TOPIC,
+    STATE_TOPIC,
     AdaptiveSubscription,
     header,
     message_class,
@@ -36,7 +38,6 @@ from paint_deposition.request import POSE_FORMAT, MotionOptions, is_pose
 
 # Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-POSES = 'atomizer/pose'
 SIGNALS = ('trigger', 'flow', 'brush', 'speed')
 # What a signal must be, where not every number will do.
 USABLE: dict[str, tuple[Callable[[float], bool], str]] = {
@@ -109,7 +110,7 @@ class AtomizerSource(PaintNode):
             raise PaintError(
                 f'{self.get_name()}: urdf_file and base_link are empty: give the robot, or the '
                 'frame in which tf knows its tip; or trigger alone beside a robot that publishes '
-                f'{POSES}'
+                f'{POSE_TOPIC}'
             )
         alone = [name for name in SIGNALS[1:] if values[name] and not values['trigger']]
         if alone:
@@ -123,9 +124,7 @@ class AtomizerSource(PaintNode):
         self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         named = {name: Signal.parse(values[name]) for name in SIGNALS}
         self._signals = {name: signal for name, signal in named.items() if signal is not None}
-        self._state_publisher = self.create_publisher(
-            AtomizerState, 'atomizer/state', LATCHED_STATES
-        )
+        self._state_publisher = self.create_publisher(AtomizerState, STATE_TOPIC, LATCHED_STATES)
         # Topics that have no publisher yet, with their callbacks; joints may be signals, too.
         self._missing: set[tuple[str, Callable[..., None]]] = {
             (signal.topic, self._on_signal_message) for signal in self._signals.values()
@@ -155,9 +154,11 @@ class AtomizerSource(PaintNode):
             self._heard += self._tf.topics
         if self._base:
             depth = QoSProfile(depth=POSE_DEPTH)
-            self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
+            self._pose_publisher = self.create_publisher(PoseStamped, POSE_TOPIC, depth)
         else:  # a robot publishes them itself
-            self.create_subscription(PoseStamped, POSES, self._watch_pose, qos_profile_sensor_data)
+            self.create_subscription(
+                PoseStamped, POSE_TOPIC, self._watch_pose, qos_profile_sensor_data
+            )
         self.create_steady_timer(0.1, self._discover_topics)
         return {'robot': self._robot_status, 'signals': self._signals_status}
 
@@ -269,7 +270,7 @@ class AtomizerSource(PaintNode):
         if self._tf is None and not self.values['urdf_file']:
             if is_silent:
                 remedy = 'if none are to come, give urdf_file or base_link'
-                return WARN, f'no poses on {POSES}; {remedy}', {}
+                return WARN, f'no poses on {POSE_TOPIC}; {remedy}', {}
             return OK, 'the robot publishes its poses', {}
         values: dict[str, object] = {
             'poses': f"of '{self._tip}' in '{self._base}'", 'published': self.poses_published,

@@ -24,7 +24,7 @@ from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.nodes.atomizer_source import LATCHED_STATES
 from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed
-from paint_deposition.nodes.topics import header
+from paint_deposition.nodes.topics import STATE_TOPIC, header
 
 TIMEOUT_S = 5.0
 POLL_S = 0.2
@@ -66,7 +66,7 @@ class SignalSource(PaintNode):
     follow: Callable[[], None]
 
     def _configure(self) -> Mapping[str, Task]:
-        self._publisher = self.create_publisher(AtomizerState, 'atomizer/state', LATCHED_STATES)
+        self._publisher = self.create_publisher(AtomizerState, STATE_TOPIC, LATCHED_STATES)
         named = ('trigger', *FIELDS)
         self.signals = {self.values[kind]: kind for kind in named if self.values[kind]}
         self._received: dict[str, float] = {}
@@ -102,14 +102,14 @@ class SignalSource(PaintNode):
             ) from None
 
     def _keep_following(self) -> None:
-        while not self.stopped.is_set():
+        while not self.stop_requested.is_set():
             self._silent = {*self.signals}
             try:
                 self.follow()
             except Exception as error:  # whatever a network and its libraries bring
                 text = ' '.join(str(error).split()) or type(error).__name__
                 self._problem = f'{self.values["url"]}: {text}'
-            self.stopped.wait(1.0)
+            self.stop_requested.wait(1.0)
 
     def take(self, signal: str, value: float, own_ns: int | None = None) -> None:
         """Take the value of a signal that arrives now; ``own_ns`` is the server's time for it."""
@@ -212,17 +212,20 @@ class RwsSource(SignalSource):
             kept = '; '.join(f'{cookie.name}={cookie.value}' for cookie in cookies.cookiejar)
             protocols: Any = ['robapi2_subscription']
             with connect(
-                events, subprotocols=protocols, additional_headers={'Cookie': kept}
-            ) as socket:
+                events, subprotocols=protocols, additional_headers={'Cookie': kept},
+                open_timeout=TIMEOUT_S, close_timeout=POLL_S,
+            ) as socket:  # fmt: skip
                 self._problem = ''  # all signals are subscribed to
                 self._take_all(first)
-                while not self.stopped.is_set():
+                while not self.stop_requested.is_set():
                     with suppress(TimeoutError):
                         self._take_all(socket.recv(POLL_S))
         finally:
-            # A controller has few sessions, and keeps those that are not closed.
+            # A controller has few sessions, and keeps those that are not closed. To one that does
+            # not answer the node gives no time when it ends.
             with suppress(OSError):
-                opener.open(f'{url}/logout', None, TIMEOUT_S).close()
+                wait_s = POLL_S if self.stop_requested.is_set() else TIMEOUT_S
+                opener.open(f'{url}/logout', None, wait_s).close()
 
     def _take_all(self, event: str | bytes) -> None:
         """Take the value of each signal in an event, which is XHTML."""
@@ -314,7 +317,7 @@ class OpcuaSource(SignalSource):
             nodes = [client.get_node(each) for each in found]
             await subscription.subscribe_data_change(nodes, sampling_interval=period_ms)
             self._problem = ''  # all signals are subscribed to
-            while not self.stopped.is_set():
+            while not self.stop_requested.is_set():
                 await asyncio.sleep(POLL_S)
                 await client.check_connection()
 

@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.node import ERROR, OK, WARN, PaintNode, Status, Task
 from paint_deposition.nodes.parameters import NodeParameter, fixed
-from paint_deposition.nodes.topics import POSE_DEPTH, header, pose_message
+from paint_deposition.nodes.topics import POSE_DEPTH, POSE_TOPIC, header, pose_message
 
 # What is read of EGM's messages: field, number and type of the wire format that ABB documents in
 # 3HAC073319 (EGM, sensor protocol); others are passed over.
@@ -100,7 +100,8 @@ class EgmStream:
             robot = egm_message().FromString(packet)
         except DecodeError:
             robot = None
-        if robot is None or not _is_whole(robot):
+        measured = None if robot is None else _measured(robot)
+        if measured is None:
             self.invalid += 1
             return None
         if sender != self.sender:
@@ -122,14 +123,7 @@ class EgmStream:
         self._ways_ns.append(arrived_ns - sent_ns)
         fastest_ns = min(self._ways_ns)
         self.late_ns = arrived_ns - sent_ns - fastest_ns
-        measured = robot.feedBack
-        pose = None
-        if measured.cartesian.HasField('orient'):
-            p, q = measured.cartesian.pos, measured.cartesian.orient
-            pose = (1e-3 * p.x, 1e-3 * p.y, 1e-3 * p.z, q.u1, q.u2, q.u3, q.u0)
-        joints, external = measured.joints.joints, measured.externalJoints.joints
-        stamp_ns = sent_ns + fastest_ns - self.lag_ns
-        return stamp_ns, pose, np.radians(joints), np.array(external)
+        return sent_ns + fastest_ns - self.lag_ns, *measured
 
     def _is_next(self, number: int) -> bool:
         """Whether a packet is newer than those before; counts what is missing between."""
@@ -145,16 +139,24 @@ class EgmStream:
         return True
 
 
-def _is_whole(robot: Any) -> bool:
-    """Whether a packet has number and time, and a place or joints that are finite."""
+def _measured(robot: Any) -> tuple[tuple[float, ...] | None, np.ndarray, np.ndarray] | None:
+    """Pose, joints and external axes of a packet, as in a ``Position``; None if it is not whole.
+
+    It needs number and time, and a pose or joints, all of them finite. A pose of which a number
+    is missing is none.
+    """
     if not (robot.header.HasField('seqno') and robot.header.HasField('tm')):
-        return False
-    place, joints = robot.feedBack.cartesian, [*robot.feedBack.joints.joints]
-    of_place = [(place.pos, axis) for axis in 'xyz'] + [(place.orient, f'u{k}') for k in range(4)]
-    has_place = all(kind.HasField(name) for kind, name in of_place)
-    numbers = [*joints, *robot.feedBack.externalJoints.joints]
-    numbers += [getattr(kind, name) for kind, name in of_place]
-    return (has_place or len(joints) > 0) and bool(np.isfinite(numbers).all())
+        return None
+    place, pose = robot.feedBack.cartesian, None
+    of_pose = [(place.pos, axis) for axis in 'xyz']
+    of_pose += [(place.orient, f'u{k}') for k in (1, 2, 3, 0)]
+    if all(kind.HasField(name) for kind, name in of_pose):
+        values = [getattr(kind, name) for kind, name in of_pose]
+        pose = (*(1e-3 * value for value in values[:3]), *values[3:])
+    joints = np.radians(robot.feedBack.joints.joints)
+    external = np.array(robot.feedBack.externalJoints.joints)
+    is_finite = bool(np.isfinite([*joints, *external, *(pose or ())]).all())
+    return (pose, joints, external) if is_finite and (pose or len(joints)) else None
 
 
 class EgmSource(PaintNode):
@@ -217,7 +219,7 @@ class EgmSource(PaintNode):
             ) from None
         self._socket.settimeout(0.2)
         profile = QoSProfile(depth=POSE_DEPTH)
-        self._poses = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
+        self._poses = self.create_publisher(PoseStamped, POSE_TOPIC, profile)
         self._joints = self.create_publisher(JointState, 'joint_states', profile)
         self.stream = EgmStream(round(1e9 * self.values['lag_s']))
         self._heard_s, self._lacks = time.monotonic(), ''
@@ -235,7 +237,7 @@ class EgmSource(PaintNode):
         frame_id, names = self.values['frame_id'], self.values['joint_names']
         external = self.values['external_joints']
         with self._socket:
-            while not self.stopped.is_set():
+            while not self.stop_requested.is_set():
                 try:
                     packet, (sender, _) = self._socket.recvfrom(65_536)
                 except TimeoutError:

@@ -215,7 +215,7 @@ class IndexPlanner(PaintNode):
         except CancelledError:
             goal.canceled()
             return PlanPasses.Result(message='cancelled')
-        except (PaintError, MemoryError) as error:
+        except (PaintError, OSError, MemoryError) as error:
             goal.abort()
             return PlanPasses.Result(message=str(error) or 'not enough memory')
         goal.succeed()

@@ -1,5 +1,6 @@
 """Managed (lifecycle) nodes, which can also configure and activate themselves."""
 
+from contextlib import suppress
 from functools import partialmethod
 from typing import Any
 
@@ -28,7 +29,8 @@ class ManagedNode(PaintNode, LifecycleNodeMixin):
     and `cleanup` also those that callbacks created since `configure`: a callback that creates one
     for the time of activity destroys it in `_deactivate`. A PaintError leaves the state as it
     was; any other error leads to `unconfigured`. Either is logged in one line. While a request is
-    under way, whose answer needs its service, the node refuses to leave a state.
+    under way, whose answer needs its service, the node refuses to leave a state. Nothing keeps it
+    from shutting down: it stops its work at once, and cleans up after that answer.
     """
 
     PARAMETERS: ParameterTable = MANAGED
@@ -73,9 +75,13 @@ class ManagedNode(PaintNode, LifecycleNodeMixin):
         return len(self._created) > 1
 
     def close(self) -> None:
-        """Deactivate and clean up, if the node is active or configured."""
-        while self.configured:
-            self._leave()
+        """Deactivate and clean up, if the node is active or configured, whatever fails."""
+        try:
+            if self.configured:
+                self._leave(may_stay=False)
+        finally:
+            if self.configured:
+                self.close()
 
     def destroy_node(self) -> None:
         super().destroy_node()
@@ -88,17 +94,19 @@ class ManagedNode(PaintNode, LifecycleNodeMixin):
 
     def _transition(self, done: str, step: str, state: LifecycleState) -> TransitionCallbackReturn:
         """Do the step of that name; `done` says what the node is then."""
-        self._failure = None
         try:
-            if step != '_enter' and self.awaiting:
+            if step == '_leave' and self.awaiting:
                 raise PaintError('a request is under way: call again after it')
             getattr(self, step)()
         except Exception as error:
-            self._failure = error
+            expected = isinstance(error, PaintError)
+            # A node that refuses to leave its state is as well as before.
+            if step != '_leave' or not expected:
+                self._failure = error
             if not self.autostarting:  # else the process ends with this error
                 self.get_logger().error(f'not {done}: {_error_text(error)}')
-            expected = isinstance(error, PaintError)
             return TransitionCallbackReturn.FAILURE if expected else TransitionCallbackReturn.ERROR
+        self._failure = None
         if not self.autostarting:
             self.get_logger().info(done)
         return TransitionCallbackReturn.SUCCESS
@@ -107,10 +115,19 @@ class ManagedNode(PaintNode, LifecycleNodeMixin):
     on_activate = partialmethod(_transition, 'activated', '_enter')
     on_deactivate = partialmethod(_transition, 'deactivated', '_leave')
     on_cleanup = partialmethod(_transition, 'cleaned up', '_leave')
-    on_shutdown = partialmethod(_transition, 'shut down', 'close')
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        if not self.awaiting:
+            return self._transition('shut down', 'close', state)
+        # A shutdown that fails leads to `finalized`, too.
+        if self.active:
+            self._leave(may_stay=False)
+        self.create_steady_timer(0.1, lambda: self.awaiting or self.on_shutdown(state))
+        return TransitionCallbackReturn.SUCCESS
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.close()
+        with suppress(PaintError):  # whoever could not save a film has said so
+            self.close()
         return TransitionCallbackReturn.SUCCESS
 
     def _enter(self) -> None:
@@ -129,7 +146,7 @@ class ManagedNode(PaintNode, LifecycleNodeMixin):
             raise
         self._created[-1] = self._entities - before
 
-    def _leave(self) -> None:
+    def _leave(self, may_stay: bool = True) -> None:
         """Deactivate the node if it is active, else clean it up; a PaintError keeps its state."""
         stays = False
         try:
@@ -138,7 +155,7 @@ class ManagedNode(PaintNode, LifecycleNodeMixin):
             else:
                 self._cleanup()
         except PaintError:
-            stays = True
+            stays = may_stay
             raise
         finally:
             if not stays:

@@ -48,10 +48,10 @@ class PaintNode(Node):
 
     Attributes:
         loading: whether a node of this process is reading its files.
-        stopping: whether this process was asked to end.
+        signalled: whether this process was asked to end.
         configured: whether the files have been read.
         values: current values of the parameters, by name.
-        stopped: whether the thread of this node is to end.
+        stop_requested: an event that tells the thread of this node to end.
         tasks: the diagnostic tasks, by name.
         awaiting: number of requests whose work a thread does right now.
         finished: a future that ends the process, with an error if it has an exception.
@@ -59,7 +59,7 @@ class PaintNode(Node):
 
     NAME = 'paint_node'
     PARAMETERS: ParameterTable = MappingProxyType({})
-    loading = stopping = False
+    loading = signalled = False
     configured = True
     awaiting = 0
     _thread: threading.Thread | None = None
@@ -67,13 +67,15 @@ class PaintNode(Node):
     def __init__(self, **kwargs: Any):
         super().__init__(self.NAME, **kwargs)
         self.finished: Future = Future()
-        self.stopped = threading.Event()
+        self.stop_requested = threading.Event()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         try:
             self.values = declare_parameters(self, self.PARAMETERS)
             named = {name: v for name, v in self.values.items() if name != 'output_directory'}
-            files = [Path(file).resolve() for file in self._files_of(named)]
-            self._input_folders = [file if file.is_dir() else file.parent for file in files]
+            # Unlike the methods of a path, these mind no loop of links and no closed folder.
+            files = [os.path.realpath(file) for file in self._files_of(named)]
+            folders = [file if os.path.isdir(file) else os.path.dirname(file) for file in files]
+            self._input_folders = [Path(folder) for folder in folders]
             self._validate(self.values, set())
             self._start()
         except PaintError:
@@ -91,7 +93,7 @@ class PaintNode(Node):
         """Configure the node; SIGINT and SIGTERM interrupt it."""
         PaintNode.loading = True
         try:
-            if PaintNode.stopping:
+            if PaintNode.signalled:
                 os._exit(0)
             return self._configure()
         finally:
@@ -121,7 +123,7 @@ class PaintNode(Node):
 
     def close(self) -> None:
         """Close files and the like. Called once, after the last callback; signals are ignored."""
-        self.stopped.set()
+        self.stop_requested.set()
         if self._thread is not None:
             self._thread.join()
 
@@ -132,7 +134,7 @@ class PaintNode(Node):
     # --- for all users
 
     def start_thread(self, work: Callable[[], None]) -> None:
-        """Do work that ends soon once ``stopped`` is set, which closing the node does.
+        """Do work that ends soon once ``stop_requested`` is set, which closing the node does.
 
         An exception ends the process.
         """
@@ -261,7 +263,7 @@ class PaintNode(Node):
             for file in self._files_of(new):
                 self.require_named_folder(file)
             self._validate(self.values | new, set(new) if self.configured else set())
-        except (PaintError, MemoryError) as error:
+        except (PaintError, OSError, MemoryError) as error:
             reason = str(error) or 'not enough memory'
             return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
@@ -271,15 +273,16 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
     """Run one node until it finishes or the process gets a signal; return the exit code.
 
     SIGINT, which `ros2 launch` sends twice, and SIGTERM stop the node between callbacks with exit
-    code 0. A PaintError is one line on stderr and exit code 2, any other exception a traceback
-    and exit code 1. The node is closed in every case. ``signals`` were received before the call.
+    code 0. A PaintError, or a file without access, is one line on stderr and exit code 2, any
+    other exception a traceback and exit code 1. The node is closed in every case. ``signals``
+    were received before the call.
     """
     node: PaintNode | None = None
     received = [] if signals is None else signals
 
     def on_signal(number: int, _frame: object) -> None:
         received.append(number)
-        PaintNode.stopping = True
+        PaintNode.signalled = True
         # Files are read for minutes with a new model, and nothing is lost. An exception instead
         # could be swallowed by a library or by the compiler.
         if PaintNode.loading:
@@ -336,8 +339,11 @@ def _create_node(make_node: Callable[[], PaintNode]) -> PaintNode:
 
 
 def _report_error(error: Exception) -> int:
-    if isinstance(error, PaintError | MemoryError):
-        sys.stderr.write(f'error: {str(error) or "not enough memory"}\n')
-        return 2
-    traceback.print_exception(error)
-    return 1
+    text = str(error) or 'not enough memory'
+    if isinstance(error, OSError) and error.filename:  # a folder that is closed to this user
+        text = f'{error.filename}: {error.strerror}'
+    elif not isinstance(error, PaintError | MemoryError):
+        traceback.print_exception(error)
+        return 1
+    sys.stderr.write(f'error: {text}\n')
+    return 2

@@ -235,9 +235,8 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
     overrides = {name: parameter.value for name, parameter in node._parameter_overrides.items()}
     of_rclpy = {'use_sim_time', 'start_type_description_service'}
     for name in overrides.keys() - table.keys() - of_rclpy:
-        if not name.startswith('qos_overrides.'):
-            remedy = did_you_mean(name, table)
-            raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
+        remedy = did_you_mean(name, table)
+        raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
     for name, row in table.items():
         try:
             value = row.checked(name, overrides.get(name, row.default))

@@ -23,6 +23,8 @@ from visualization_msgs.msg import Marker
 
 from paint_deposition.files.recordings.messages import nanoseconds
 
+# Of a gun, whose name precedes them where there are several.
+POSE_TOPIC, STATE_TOPIC = 'atomizer/pose', 'atomizer/state'
 # On which every subscriber of the poses reports its progress.
 PROGRESS_TOPIC = 'atomizer/progress'
 PART_TOPIC = 'part'
@@ -146,7 +148,7 @@ class AdaptiveSubscription:
     def unsubscribe(self) -> None:
         """Take what is in the queues, and unsubscribe until the quality of service is matched.
 
-        What is sent meanwhile is not lost, and what is latched comes again.
+        What is sent meanwhile is not counted as lost; what is latched is received again.
         """
         for quality in [*self._subscriptions]:
             self._end(quality)
@@ -174,8 +176,8 @@ class AdaptiveSubscription:
         is_newer = self._made_s[heard_by] < own_s and now_s - own_s < OVERLAP_S
         if offered != heard_by and not is_newer:
             return
-        # The number is 0 if the middleware has none.
-        number = info.get('publication_sequence_number') or 0
+        # 0 where the middleware has none, or ROS, before Kilted, does not say whose it is.
+        number = (publisher and info.get('publication_sequence_number')) or 0
         before = self._newest.pop(publisher, number)
         self._newest[publisher] = max(number, before)
         self.lost += max(number - before - 1, 0)

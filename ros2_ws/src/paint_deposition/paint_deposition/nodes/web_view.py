@@ -101,7 +101,7 @@ class WebView(PaintNode):
             )
             for name in names
             for message, topic in (
-                (AtomizerState, 'atomizer/state'), (PoseStamped, 'atomizer/pose'),
+                (AtomizerState, topics.STATE_TOPIC), (PoseStamped, topics.POSE_TOPIC),
             )
         ]  # fmt: skip
         # At 1 kHz fifty poses wait at most.
@@ -131,13 +131,14 @@ class WebView(PaintNode):
 
     def _take_part(self, part: Part) -> None:
         self._newest_ns, self._time_s = 0, 0.0
-        if part.mesh_file == self._mesh_file:
+        # A mesh that was exported anew has its old name.
+        if part.mesh_file == self._mesh_file and part.mesh_id in self._mesh_ids:
             self.scene.begin_again()
         else:
             try:
                 self.require_named_folder(part.mesh_file)
                 self._show_part(part.mesh_file)
-            except (PaintError, MemoryError) as error:
+            except (PaintError, OSError, MemoryError) as error:
                 self._say(str(error) or 'not enough memory')
                 return
         serial = f'{part.serial}, ' if part.serial else ''
@@ -180,8 +181,8 @@ class WebView(PaintNode):
 
     def _say(self, problem: str) -> None:
         """Tell what keeps the film from being shown; '' is nothing."""
-        if problem:
-            self.get_logger().error(problem, once=True)
+        if problem and problem != self._problem:
+            self.get_logger().error(problem)
         self._problem = problem
         self.scene.tell('message', text=problem)
 

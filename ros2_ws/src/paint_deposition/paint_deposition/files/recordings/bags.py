@@ -282,7 +282,8 @@ def write_pose_bag(
             _add_topic(run, JOINT_TOPIC, JOINT_TRAJECTORY_TYPE)
             point = types.types['trajectory_msgs/msg/JointTrajectoryPoint']
             duration, none = types.types['builtin_interfaces/msg/Duration'], np.empty(0)
-            seconds = [duration(int(s), round(s % 1.0 * 1e9)) for s in drive.seconds.tolist()]
+            times_ns = np.rint(drive.seconds * 1e9).astype(np.int64).tolist()
+            seconds = [duration(*divmod(at_ns, 10**9)) for at_ns in times_ns]
             points = [
                 point(position, speed, none, none, at)
                 for position, speed, at in zip(drive.joints, drive.speeds, seconds, strict=True)

@@ -130,12 +130,12 @@ class BagPlayer(PaintNode):
                 )
         # Reliable, so that subscribers acknowledge.
         profile = QoSProfile(depth=max(topics.POSE_DEPTH, values['window']))
-        self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
-        self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
+        self._pose_publisher = self.create_publisher(PoseStamped, topics.POSE_TOPIC, profile)
+        self._state_publisher = self.create_publisher(AtomizerState, topics.STATE_TOPIC, profile)
         self._clock_publisher: Publisher | None = None
         self._clock_order = threading.Lock()
         self._pace = Pace(
-            self, self._pose_publisher, self.stopped, rate=values['rate'],
+            self, self._pose_publisher, self.stop_requested, rate=values['rate'],
             window=values['window'], running=not values['start_paused'],
         )  # fmt: skip
         if values['publish_clock']:
@@ -189,14 +189,14 @@ class BagPlayer(PaintNode):
             message = 'resumed' if running else 'paused'
         else:
             message = 'not paused' if running else 'already paused'
-        return Trigger.Response(success=changes, message=message)
+        return Trigger.Response(success=True, message=message)
 
     def status(self) -> Status:
         if self._clock_publisher and self.count_publishers('/clock') > 1:
             jumps = 'another node publishes /clock, too: time jumps for nodes with use_sim_time'
             return WARN, f'{jumps}; set publish_clock to false for one of them', {}
         status = self._pace.status if self._pace.running else 'paused'
-        ahead = self._pace.lag(time.monotonic())
+        ahead = self._pace.write_off_lost(time.monotonic())
         values = {
             'bag': self.values['bag'],
             'poses published': self.poses_published,
@@ -208,7 +208,7 @@ class BagPlayer(PaintNode):
     # --- the replay's own thread
 
     def _replay(self) -> None:
-        while not self.stopped.is_set():
+        while not self.stop_requested.is_set():
             begun = False
             with open_bag(self.values['bag']) as bag:
                 for message in self._messages(bag):
@@ -219,7 +219,7 @@ class BagPlayer(PaintNode):
                         self._subscribers_to_await = 0  # when looping
                         self._pace.change(started=True)
                     self._pace.wait_for(message.log_time_ns)
-                    if self.stopped.is_set():
+                    if self.stop_requested.is_set():
                         break
                     self._publish(message, bag)
             self._pace.change(started=False)

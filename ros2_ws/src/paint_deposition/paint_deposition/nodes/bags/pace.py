@@ -145,8 +145,8 @@ class Pace:
                 if taken > subscriber.taken:
                     subscriber.taken, subscriber.advanced_s = taken, now_s
 
-    def lag(self, now_s: float) -> dict[str, int]:
-        """Number of poses that each subscriber still has to take, and has not lost."""
+    def write_off_lost(self, now_s: float) -> dict[str, int]:
+        """Take off what subscribers have lost; how many poses each of them still has to take."""
         with self._changed:
             behind = {}
             for name, subscriber in self.subscribers.items():
@@ -213,7 +213,7 @@ class Pace:
             now_s = time.monotonic()
             if now_s - self._discovered_s > 0.1:
                 self._discover()
-            behind = self.lag(now_s)
+            behind = self.write_off_lost(now_s)
             if max(behind.values(), default=0) < limit:
                 break
             if now_s - logged_s > LOG_PERIOD_S:

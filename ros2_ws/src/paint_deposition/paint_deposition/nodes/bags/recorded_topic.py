@@ -29,6 +29,8 @@ from paint_deposition.nodes.parameters import (
 )
 from paint_deposition.nodes.topics import (
     MOST_PUBLISHERS,
+    POSE_TOPIC,
+    STATE_TOPIC,
     TRUST_TOPIC,
     AdaptiveSubscription,
     gun_topic,
@@ -36,7 +38,6 @@ from paint_deposition.nodes.topics import (
     message_class,
 )
 
-POSES, STATES = 'atomizer/pose', 'atomizer/state'
 # A message of these that is lost is lost motion, or paint.
 MOTION_TYPES = {POSE_TYPE, STATE_TYPE, JOINT_TYPE, *TF_TYPES}
 STATIC_TF, PART_POSE, PARAMETER_EVENTS = '/tf_static', 'part_pose', '/parameter_events'
@@ -82,7 +83,7 @@ def default_topics(guns: Sequence[str]) -> list[str]:
 
     Without the mesh markers: cloud and field hold the same in a fortieth of their size.
     """
-    motion = [gun_topic(gun, topic) for gun in guns for topic in (POSES, STATES)]
+    motion = [gun_topic(gun, topic) for gun in guns for topic in (POSE_TOPIC, STATE_TOPIC)]
     shares = [gun_topic(gun, 'thickness/field') for gun in guns if len(guns) > 1]
     return [
         *motion, *shares, 'thickness/cloud', 'thickness/field', 'thickness/stats', TRUST_TOPIC,

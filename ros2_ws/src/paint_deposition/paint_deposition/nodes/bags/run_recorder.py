@@ -1,7 +1,6 @@
 """Node `run_recorder`: records a run in the layout of rosbag2, and reports lost messages."""
 
 import itertools
-import os
 import shutil
 import time
 from collections import Counter
@@ -24,9 +23,7 @@ from paint_deposition.nodes.bags.recorded_topic import (
     MOTION_TYPES,
     PARAMETER_EVENTS,
     PART_POSE,
-    POSES,
     RECORDER,
-    STATES,
     RecordedTopic,
     bag_qos,
     default_topics,
@@ -34,10 +31,18 @@ from paint_deposition.nodes.bags.recorded_topic import (
 from paint_deposition.nodes.managed_node import ManagedNode
 from paint_deposition.nodes.node import ERROR, OK, WARN, Status, Task
 from paint_deposition.nodes.parameters import require_file_name
-from paint_deposition.nodes.topics import PART_TOPIC, PROGRESS, PROGRESS_TOPIC, gun_topic, header
+from paint_deposition.nodes.topics import (
+    PART_TOPIC,
+    POSE_TOPIC,
+    PROGRESS,
+    PROGRESS_TOPIC,
+    STATE_TOPIC,
+    gun_topic,
+    header,
+)
 
-# The run of a part that has left takes what was sent for it until it has all, or none has come so
-# long: a message that got lost comes with the third next heartbeat of its writer at the latest.
+# The run of the part before takes what was sent for it until it has all, or none has come so long:
+# a message that got lost comes with the third next heartbeat of its writer at the latest.
 LATE_S = 10.0
 
 
@@ -61,20 +66,28 @@ class RunRecorder(ManagedNode):
         wanted = map(resolved, self.values['topics'] or default_topics(guns))
         self._wanted = list(dict.fromkeys([*wanted, self._part_topic]))
         motion = {
-            gun: (resolved(gun_topic(gun, POSES)), resolved(gun_topic(gun, STATES)))
+            gun: (resolved(gun_topic(gun, POSE_TOPIC)), resolved(gun_topic(gun, STATE_TOPIC)))
             for gun in guns
         }
         self._part_pose = resolved(PART_POSE)
         self._initial_messages = InitialMessages(motion, self._part_pose)
-        # Also while no run is recorded, since they stay in force.
+        # Also while the node is inactive, since they stay in force.
         self._always_heard = {PARAMETER_EVENTS, *(states for _, states in motion.values())}
         self.recorded: dict[str, RecordedTopic] = {}
+        self._refused: set[str] = set()
+        self._begun_ns = time.time_ns()
+        # The run of the part before, while messages for it may come; until when, and by topic when
+        # the last of them was sent. How many came even later.
+        self.run_before: RunWriter | None = None
+        self._open_until_s, self._too_late = 0.0, 0
+        self._last_sent_ns: dict[str, int] = {}
         self._error: RecordingError | None = None
         self._progress = {
             poses: self.create_publisher(PoseProgress, gun_topic(gun, PROGRESS_TOPIC), PROGRESS)
             for gun, (poses, _) in motion.items()
         }
         self.create_service(Trigger, '~/stop', lambda *_: self._stop())
+        self.create_steady_timer(0.1, self._discover)
         return {'recording': self.status}
 
     def _activate(self) -> None:
@@ -85,13 +98,9 @@ class RunRecorder(ManagedNode):
         # Run and stamp of the part, as it was announced, and when.
         self._part: tuple[str, int] | None = None
         self._announced_ns = 0
-        self._refused: set[str] = set()
-        # The run of the part that has left, while poses of it may come; until when, and by topic
-        # when the last of its messages was sent. Those that came even later.
-        self.leaving: RunWriter | None = None
-        self._leaves_s, self._too_late = 0.0, 0
-        self._left_ns: dict[str, int] = {}
-        self.create_steady_timer(0.1, self._discover)
+        self._refused.clear()
+        self._last_sent_ns.clear()
+        self._too_late = 0
         self.create_steady_timer(0.1, lambda: self._guarded(self.run.close_old_chunk))
         self.create_steady_timer(0.2, self._report_progress)
         self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
@@ -113,7 +122,7 @@ class RunRecorder(ManagedNode):
         return RunWriter(run, custom_data, compression=self.values['compression'])
 
     def destroy_node(self) -> None:
-        for run in (self.run, self.leaving) if self.runs else ():
+        for run in (self.run, self.run_before) if self.runs else ():
             if run is not None:
                 run.abandon()
         super().destroy_node()
@@ -121,11 +130,13 @@ class RunRecorder(ManagedNode):
     # --- discovery
 
     def _discover(self) -> None:
-        if self.leaving is not None and self._has_left(self.leaving):
+        if self.run_before is not None and self._is_whole(self.run_before):
             self._drain()  # what is in the queues may be of that part
-            if self._has_left(self.leaving):
-                self._guarded(self._end_of_leaving)
+            if self._is_whole(self.run_before):
+                self._guarded(self._end_run_before)
         for name in self._wanted:
+            if not (self.active or name in self._always_heard):
+                continue
             publishers = self.get_publishers_info_by_topic(name)
             if not publishers or name in self._refused or self._error is not None:
                 continue
@@ -140,7 +151,8 @@ class RunRecorder(ManagedNode):
                     self.recorded[name].match_qos()
                     continue
                 about = name, types[0], definitions.installed(types[0]), offered
-                self._guarded(self.run.add_topic, *about)
+                if self.active:
+                    self._guarded(self.run.add_topic, *about)
                 self.recorded[name] = RecordedTopic(
                     self, about, self._write, max_gap_ns, self._begun_ns,
                     depth=5000 if types[0] in MOTION_TYPES else 100,
@@ -159,38 +171,40 @@ class RunRecorder(ManagedNode):
             self._change_part(deserialize_message(cdr, Part), log_time_ns, sent_ns)
         elif name == self._part_pose and sent_ns <= self._announced_ns:
             return  # where the part before stood, which its run says already
-        elif sent_ns <= self._left_ns.get(name, 0):
+        elif sent_ns <= self._last_sent_ns.get(name, 0):
             self._guarded(self._write_late, name, cdr, log_time_ns, sent_ns)
             return
-        elif self.leaving is not None and name == TF in self.leaving.counts:
-            self._guarded(self.leaving.write, name, cdr, log_time_ns, sent_ns)
+        elif self.run_before is not None and name == TF in self.run_before.counts:
+            self._guarded(self.run_before.write, name, cdr, log_time_ns, sent_ns)
         self._initial_messages.add(name, cdr, log_time_ns, sent_ns)
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self.recorded[name].messages % 50 == 0:
             self._report_progress()
 
     def _write_late(self, name: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> None:
-        """Write what was sent for the part that has left into its run, before what was not."""
+        """Write what was sent for the part before into its run, before what was not."""
         if name in self._progress:
             self._initial_messages.add_late(name, cdr, sent_ns)
-        if self.leaving is None:
+        if self.run_before is None:
             self._too_late += 1
             return
-        if name not in self.leaving.counts:
-            self.leaving.add_topic(*self.recorded[name].about)
+        if name not in self.run_before.counts:
+            self.run_before.add_topic(*self.recorded[name].about)
         before_ns = self._initial_messages.begin_ns - 1
-        self.leaving.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
-        if name in self.leaving.kept:
-            self.leaving.kept[name] += 1
-        self._leaves_s = time.monotonic() + LATE_S
+        self.run_before.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
+        if name in self.run_before.kept:
+            self.run_before.kept[name] += 1
+        self._open_until_s = time.monotonic() + LATE_S
 
-    def _has_left(self, leaving: RunWriter) -> bool:
+    def _is_whole(self, run_before: RunWriter) -> bool:
         """Whether a run has the last messages of its part, which come in order, or waits no more.
 
         Later transforms may still tell where the part was.
         """
-        misses = any(t.sent_ns < self._left_ns.get(name, 0) for name, t in self.recorded.items())
-        return not (misses or TF in leaving.counts) or time.monotonic() > self._leaves_s
+        misses = any(
+            t.sent_ns < self._last_sent_ns.get(name, 0) for name, t in self.recorded.items()
+        )
+        return not (misses or TF in run_before.counts) or time.monotonic() > self._open_until_s
 
     def _drain(self) -> None:
         """Take what is in the queues of all topics but that of the part."""
@@ -198,12 +212,12 @@ class RunRecorder(ManagedNode):
             if topic.name != self._part_topic:
                 topic.take_pending()
 
-    def _end_of_leaving(self) -> None:
-        """Complete the run of the part that has left."""
-        leaving, self.leaving = self.leaving, None
-        if leaving is not None:
-            leaving.finish()
-            self.get_logger().info(_summary(leaving, self._lost_of_leaving))
+    def _end_run_before(self) -> None:
+        """Complete the run of the part before, if it still takes messages."""
+        run_before, self.run_before = self.run_before, None
+        if run_before is not None:
+            run_before.finish()
+            self.get_logger().info(_summary(run_before, self._losses_before))
 
     def _change_part(self, part: Part, log_time_ns: int, sent_ns: int) -> None:
         """Complete the run of the previous part, and begin that of the new one."""
@@ -214,22 +228,22 @@ class RunRecorder(ManagedNode):
         if not part.run and not any(self.run.counts.get(poses) for poses in self._progress):
             return  # a reset from before this recorder
         try:
-            # The mesh file of a simulator on another machine may not exist here.
-            mesh_file = part.mesh_file if os.path.isfile(part.mesh_file) else ''
-            data = provenance(mesh_file, self.values['model_file'])
+            # The mesh file is one of the simulator's machine: it is not opened here.
+            data = provenance('', self.values['model_file'])
+            data |= {'mesh_file': part.mesh_file, 'mesh_id': part.mesh_id}
             data |= {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
             if part.part_pose:
                 data['part_pose'] = ' '.join(map(str, part.part_pose))
             new_run = self._create_run(part.run, data, keep_name=False)
             self._drain()
-            self._end_of_leaving()
+            self._end_run_before()
             # Some messages were sent for this part, and are in the run before, too.
             self._announced_ns = sent_ns
-            self._left_ns, early = self._initial_messages.begin_part(part, sent_ns)
+            self._last_sent_ns, early = self._initial_messages.begin_part(part, sent_ns)
             counts = self.run.counts
             self.run.kept |= {name: counts[name] - count for name, count in early.items()}
-            self.leaving, self._lost_of_leaving = self.run, self._losses
-            self._leaves_s = time.monotonic() + LATE_S
+            self.run_before, self._losses_before = self.run, self._losses
+            self._open_until_s = time.monotonic() + LATE_S
             self._begin_run(new_run, log_time_ns)
             self.get_logger().info(f'recording {part.run} into {self.run.folder}')
         except RecordingError as error:
@@ -274,7 +288,7 @@ class RunRecorder(ManagedNode):
         if self.active:
             self.trigger_deactivate()
         # The answer of a process that ends at once may be lost; its client would wait for ever.
-        self.create_steady_timer(1.0, self.finish)
+        self._lasting.add(self.create_steady_timer(1.0, self.finish))
         if not self.runs:
             message = 'nothing was recorded: the recorder was never activated'
             return Trigger.Response(success=True, message=message)
@@ -289,7 +303,7 @@ class RunRecorder(ManagedNode):
         self._initial_messages.end_motion()
         if self._error is not None:
             return
-        self._guarded(self._end_of_leaving)
+        self._guarded(self._end_run_before)
         self._guarded(self.run.finish)
         self.get_logger().info(self.summary())
         never = [name for name in self._wanted if name not in self.recorded]

@@ -47,7 +47,7 @@ class AtomizerInput:
 
     Attributes:
         name: of the gun, '' for the only one of a cell.
-        poses_received: since the node started.
+        poses_received: since the node was configured.
         newest_ns: stamp of the last pose that was painted or dropped, 0 before the first.
         sent_ns, state_sent_ns: when the last pose received and the last state taken were sent, 0
             before the first.
@@ -57,23 +57,24 @@ class AtomizerInput:
             newest state, 0 or NaN: unknown.
         topics: the subscriptions, which count what the middleware has lost since the last reset.
         tf_queue: poses that wait for their transform.
+        times_s: (computing time, duration of the motion) of the last batches.
+        unheard_states: why states of another type are not heard, as said last, '' if none come.
         refused_frames: poses refused for their frame, by frame; refusal: reason of the last.
         unpainted: poses received while the node was not active.
-        times_s: (computing time, duration of the motion) of the last batches.
         anomalies: other poses and states with something wrong, counted by its description.
         state_errors: why states were refused, each reason once.
-        steps: from pose to pose. These and all counts from `refused_frames` on are since the last
-            reset.
+        steps: from pose to pose. This and all from `refused_frames` on are since the last reset.
     """
 
     def __init__(self, node: PaintingNode, number: int) -> None:
         name = node.gun_names[number]
         self._node, self._number, self.name = node, number, name
-        self._pose_topic = gun_topic(name, 'atomizer/pose')
-        self._state_topic = gun_topic(name, 'atomizer/state')
+        self._pose_topic = gun_topic(name, topics.POSE_TOPIC)
+        self._state_topic = gun_topic(name, topics.STATE_TOPIC)
         self.poses_received = self.newest_ns = self.sent_ns = self.state_sent_ns = 0
         self.refused_s = self.pose_s = self._flushed_s = -math.inf
         self.spraying, self.programmed_m_per_s = False, 0.0
+        self.unheard_states = ''
         self.last_poses = NO_POSES
         self._newest: PoseStamped | None = None
         # Stamp of a state that is ahead of the poses, and when it was sent [ns].

@@ -83,7 +83,7 @@ class DepositionSimulator(PaintingNode):
 
     def reset(self) -> Trigger.Response:
         """Clear the film and all counts; a new run begins, if there were poses."""
-        if self.parts.waiting:
+        if self.parts.changing:
             message = 'the part is being changed: call again after it'
             return Trigger.Response(success=False, message=message)
         self.catch_up()

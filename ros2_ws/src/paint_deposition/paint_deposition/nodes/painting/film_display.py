@@ -109,23 +109,17 @@ def large_publisher(
     fifth of a core.
     """
     # The event of the last subscriber that came or left.
-    matched: Any = SimpleNamespace(current_count=0, total_count=0)
+    last: Any = SimpleNamespace(event=SimpleNamespace(current_count=0, total_count=0))
     # The last version sent, and the total number of subscribers by then.
     sent: tuple[int, int] | None = None
     sent_s = next_allowed_s = 0.0
-
-    def take(event: Any) -> None:
-        nonlocal matched
-        matched = event
-
-    publisher: Publisher = node.create_publisher(
-        message, topic, profile, event_callbacks=PublisherEventCallbacks(matched=take)
-    )
+    events = PublisherEventCallbacks(matched=partial(setattr, last, 'event'))
+    publisher: Publisher = node.create_publisher(message, topic, profile, event_callbacks=events)
 
     def publish_if_wanted(version: int, make: Callable[[], Any]) -> None:
         nonlocal sent, sent_s, next_allowed_s
         # Not the publisher's own count, which grows before the event of a new subscriber.
-        subscribers, began_s = matched, time.monotonic()
+        subscribers, began_s = last.event, time.monotonic()
         wanted = version, subscribers.total_count
         if not subscribers.current_count or wanted == sent or began_s < next_allowed_s:
             return
@@ -204,8 +198,7 @@ class FilmDisplay:
                 elif gun == source.name and newest_ns and behind_s > 2.0:
                     found.append(f'{name} is {behind_s:.0f} s behind')
             doubts += [f'{source.name}: {doubt}' if source.name else doubt for doubt in found]
-        if node.model_problem:
-            doubts.append(node.model_problem)
+        doubts += filter(None, (node.side_problem, node.model_problem))
         self._trust.publish(
             DiagnosticStatus(
                 level=WARN if doubts else OK, name=topics.TRUST_TOPIC,
@@ -291,18 +284,15 @@ def legend(scale: ColourScale, surface: Surface, frame_id: str) -> MarkerArray:
         r, g, b, a = (scale.palette[step * TABLE // steps] / 255.0).tolist()
         for right, over in ((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)):
             place = corner + 0.04 * size * right * across + size * (step + over) / steps * up
-            bar.points.append(_point(place))
+            x, y, z = place.tolist()
+            bar.points.append(Point(x=x, y=y, z=z))
             bar.colors.append(ColorRGBA(r=r, g=g, b=b, a=a))
     markers = [bar]
     for number, share in enumerate(np.linspace(0.0, 1.0, 5), start=1):
         label = white_marker(Marker.TEXT_VIEW_FACING, 'legend', number, frame_id)
         label.text = f'{scale.low + (scale.high - scale.low) * share:g} µm'
         label.scale = Vector3(z=0.04 * size)
-        label.pose.position = _point(corner + share * size * up + 0.1 * size * across)
+        x, y, z = (corner + share * size * up + 0.1 * size * across).tolist()
+        label.pose.position = Point(x=x, y=y, z=z)
         markers.append(label)
     return MarkerArray(markers=markers)
-
-
-def _point(place_m: np.ndarray) -> Point:
-    x, y, z = place_m.tolist()
-    return Point(x=x, y=y, z=z)

@@ -16,7 +16,7 @@ from paint_deposition.nodes.painting.atomizer_input import (
     STATES_REFUSED,
     AtomizerInput,
 )
-from paint_deposition.nodes.topics import gun_topic
+from paint_deposition.nodes.topics import STATE_TOPIC, gun_topic
 
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.painting_node import PaintingNode
@@ -80,9 +80,19 @@ def poses_status(node: PaintingNode, number: int) -> Status:
             words = f'inactive: {source.unpainted} poses came and were not painted'
             return WARN, words, values
         return OK, 'inactive', values
-    if another := _state_of_another_type(node, source.name):
-        node.get_logger().error(another, once=True)
-        return ERROR, another, values
+    # A Bool, say, which nobody hears.
+    topic, unheard = gun_topic(source.name, STATE_TOPIC), ''
+    for info in node.get_publishers_info_by_topic(node.resolve_topic_name(topic)):
+        if info.topic_type != STATE_TYPE:
+            unheard = (
+                f'{topic} comes as {info.topic_type} and does not switch the gun: publish it on '
+                'a topic of its own, and start atomizer_source with that topic as trigger'
+            )
+    if unheard and unheard != source.unheard_states:
+        node.get_logger().error(unheard)
+    source.unheard_states = unheard
+    if unheard:
+        return ERROR, unheard, values
     if source.refused_frames and time.monotonic() - source.refused_s < 5.0:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
         words = (
@@ -109,18 +119,6 @@ def sprays_without_poses(source: AtomizerInput) -> list[str]:
     return [f'the gun sprays, and no pose has come {since}']
 
 
-def _state_of_another_type(node: PaintingNode, gun: str) -> str:
-    """What to do where a Bool, say, comes as the gun's state, which nobody hears; else ''."""
-    topic = gun_topic(gun, 'atomizer/state')
-    for info in node.get_publishers_info_by_topic(node.resolve_topic_name(topic)):
-        if info.topic_type != STATE_TYPE:
-            return (
-                f'{topic} comes as {info.topic_type} and does not switch the gun: publish it on '
-                'a topic of its own, and start atomizer_source with that topic as trigger'
-            )
-    return ''
-
-
 def film_status(node: PaintingNode) -> Status:
     """The status of part, model, computing time and the share of each gun."""
     guns = node.film.guns
@@ -140,8 +138,8 @@ def film_status(node: PaintingNode) -> Status:
         **{f'share of {gun}': f'{share:.1%}' for gun, share in node.shares.items() if gun},
         **{f'note {number}': note for number, note in enumerate(node.surface.notes, start=1)},
     }
-    if node.model_problem:
-        return WARN, node.model_problem, values
+    if problem := node.side_problem or node.model_problem:
+        return WARN, problem, values
     if not all(gun.log.complete for gun in guns):
         limit = f'over {node.values["pose_memory"]} poses (pose_memory)'
         return WARN, f'{limit}: a new model paints from then on only', values

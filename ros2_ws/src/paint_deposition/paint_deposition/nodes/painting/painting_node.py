@@ -46,19 +46,19 @@ class PaintingNode(ManagedNode, ABC):
         mesh_file: the part's mesh; surface: the same, refined.
         zones: of its vertices, or None.
         points: the points that are painted.
-        models: the model of each gun, by the parameters.
-        files_in_use: the file of the model with which each gun paints, '' for the default.
+        models: with which each gun paints; files_in_use: their files, '' for the default.
         film: the film so far, by one gun or several.
         inputs: the subscriptions, one for each gun.
         repainting: films with other models, once a thread has compiled these and repainted the
             motion so far; None if that is not under way.
         shares: of the guns in the film shown, 0 to 1, by their names.
         model_problem: why the models that were set last are not in use, '' if they are.
+        side_problem: why the part is not painted on the side that the guns point at, '' if it is.
     """
 
     PRECISION = 'single'
     repainting: Future[LiveFilms] | None = None
-    model_problem = ''
+    model_problem = side_problem = ''
     _shown: CommonFilm | None = None
 
     def _configure(self) -> Mapping[str, Task]:
@@ -69,8 +69,9 @@ class PaintingNode(ManagedNode, ABC):
         self.shares: dict[str, float] = {}
         self.frame = PartFrame(self, self.values['frame_id'])
         self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
-        self.models, self._files = models_from_parameters(self.values)
-        self.files_in_use = self._files
+        # Those that the parameters name, and those in use, which have been tried out.
+        self._named_models = models_from_parameters(self.values)
+        self.models, self.files_in_use = self._named_models
         self.get_logger().info('getting ready; a new model is compiled first')
         self._take_part(self.prepare(self.mesh_file))
         self.inputs = [AtomizerInput(self, number) for number in range(len(self.gun_names))]
@@ -138,7 +139,7 @@ class PaintingNode(ManagedNode, ABC):
     def _take_part(self, part: PreparedPart) -> None:
         """Paint this part from now on."""
         self.surface, self.points, self.film, self.zones = part
-        self._shown = None
+        self._shown, self.side_problem = None, ''
         self._guns_to_orient = list(range(len(self.gun_names)))
         self._surface_changed()
 
@@ -179,7 +180,7 @@ class PaintingNode(ManagedNode, ABC):
             new.reset(keeping_trigger_of=old)
         for source in self.inputs:
             source.reset_counts()
-        self.mesh_file, self.files_in_use = mesh_file, self._files
+        self.mesh_file = mesh_file
         self._take_part((surface, points, film, zones))
         if self.repainting is not None:
             self._repaint()
@@ -219,7 +220,7 @@ class PaintingNode(ManagedNode, ABC):
             for gun in self.film.guns:
                 gun.trigger_latency_s = self.values['trigger_latency_s']
         if names & MODEL_PARAMETERS:
-            self.models, self._files = self._next_models
+            self._named_models = self._next_models
             self._repaint(from_start=self.values['repaint'])
         if 'publish_rate_hz' in names:
             self.show_timer.timer_period_ns = round(1e9 / self.values['publish_rate_hz'])
@@ -227,13 +228,13 @@ class PaintingNode(ManagedNode, ABC):
         self._shown = None
 
     def _repaint(self, from_start: bool = True) -> None:
-        """Start to compile the current models, and to repaint the motion so far, in a thread.
+        """Start to compile the models that were set last, and to repaint the motion, in a thread.
 
         Painting goes on meanwhile, in the films and their logs as they are.
         """
         if self.repainting is not None:
             self.repainting.cancel()
-        surface, points, models = self.surface, self.points, self.models
+        surface, points, (models, _) = self.surface, self.points, self._named_models
         logs = [gun.log for gun in self.film.guns]
         prepared: Future[LiveFilms] = Future()
 
@@ -271,12 +272,11 @@ class PaintingNode(ManagedNode, ABC):
             self.surface, self.points = self._points_on(oriented)
         except PaintError as error:  # readings that were taken on its other side, say
             self._guns_to_orient = []
-            self.model_problem = f'the gun paints the other side of the part: {error}'
-            self.get_logger().error(self.model_problem)
+            self.side_problem = f'the gun paints the other side of the part: {error}'
+            self.get_logger().error(self.side_problem)
             return
         # The motion so far is painted again, with the other side outward.
-        models = [gun.model for gun in self.film.guns]
-        turned = self._unpainted(self.surface, self.points, models)
+        turned = self._unpainted(self.surface, self.points, self.models)
         for new, old in zip(turned.guns, self.film.guns, strict=True):
             new.replay(old.log.events())
         self.film = turned
@@ -319,6 +319,8 @@ class PaintingNode(ManagedNode, ABC):
             films = prepared.result()
             if logs is None or not all(log.complete for log in logs):
                 for gun, film in zip(guns, films.guns, strict=True):
+                    gun.require_brushes_in(film.model)  # before the first gun changes
+                for gun, film in zip(guns, films.guns, strict=True):
                     gun.switch_model(film.model)
             elif any(gun.log is not log for gun, log in zip(guns, logs, strict=True)):
                 self._repaint()  # the motion was restarted meanwhile
@@ -330,7 +332,6 @@ class PaintingNode(ManagedNode, ABC):
         except (Exception, SystemExit) as error:  # of a user's effect; the old model stays
             self.model_problem = f'the new model is not used: {error}'
             self.get_logger().error(self.model_problem)
-            self.models = tuple(gun.model for gun in self.film.guns)
-            self._files = self.files_in_use
+            self._named_models = self.models, self.files_in_use
             return
-        self.files_in_use = self._files
+        self.models, self.files_in_use = self._named_models

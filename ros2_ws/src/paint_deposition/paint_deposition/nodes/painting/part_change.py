@@ -54,7 +54,7 @@ class PartChange:
 
     Attributes:
         part: the part in the cell, as published.
-        waiting: whether a change is under way: the mesh of the next part is still being read.
+        changing: whether a change is under way: the mesh of the next part is still being read.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class PartChange:
         present.set_result((node.surface, node.points, node.film, node.zones))
         self._parts = {version: present}
         self._reading = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
-        self.waiting = False
+        self.changing = False
         self._gap_s = 0.0
         # Films of former parts that are not on disk yet, four at most, and why.
         self._unsaved: list[Callable[[], list[Path]]] = []
@@ -144,16 +144,16 @@ class PartChange:
                 response.success = True
             else:
                 raise PaintError('prepare needs a mesh_file: name the mesh to read ahead of time')
-        except (PaintError, MemoryError) as error:
-            response.message = str(error) or 'not enough memory'
         except OSError as error:
             response.message = f'{error.filename}: {error.strerror}'
+        except Exception as error:  # of a user's effect, say: reported to the caller
+            response.message = str(error) or 'not enough memory'
         return response
 
     async def _change(self, request: ChangePart.Request, response: ChangePart.Response) -> str:
         """Change the part; what of it failed after the part had changed, if anything."""
         node = self._node
-        if self.waiting:
+        if self.changing:
             raise PaintError('another change of the part is under way: call again after it')
         if len(self._unsaved) >= 4:
             raise PaintError(f'{self._save_error}; the part stays until they are saved')
@@ -164,7 +164,7 @@ class PartChange:
         following.last_sent_ns = max(source.sent_ns for source in node.inputs)
         guns = [source.name or 'the gun' for source in node.inputs if source.spraying]
         notes = [f'{gun} sprays while the part is changed' for gun in guns]
-        self.waiting = True
+        self.changing = True
         try:
             notes += await self._receive_all(following.last_sent_ns)
             await self._begin(following, request)
@@ -176,7 +176,7 @@ class PartChange:
                 if not placed.successful:
                     unplaced = f'it stands where the part before did: {placed.reason}'
         finally:
-            self.waiting = False
+            self.changing = False
             node.release()
         self._gap_s = response.gap_s = time.monotonic() - began_s
         response.run = following.run
@@ -201,11 +201,11 @@ class PartChange:
         if not request.coat:
             read = self._prepared(version)
             part = read.result() if read.done() else await node.result_of(read)
-        if node.film.counts.received:
-            self._unsaved.append(self._film_writer())
+        writers = [self._film_writer()] if node.film.counts.received else []
         if part is not None:
             node.change_part(version[0], part)
             self._version = version
+        self._unsaved += writers
         self.part, self._since = following, datetime.now(timezone.utc)
         self._run, self._resets = following.run, 0
         self._publish(since_ns, request.part_pose)
