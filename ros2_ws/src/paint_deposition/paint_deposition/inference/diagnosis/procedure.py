@@ -208,7 +208,11 @@ def _conclude(
     """The verdict on what was found."""
     named = [c for c in state.accepted if not c.best.startswith('learned:')]
     if named:
-        names = ', and '.join(_in_words(c) for c in named)
+        alike = [', '.join(c.members[1:]) for c in named]
+        names = ', and '.join(
+            f'{c.best} (or, not distinguishable here, {others})' if others else c.best
+            for c, others in zip(named, alike, strict=True)
+        )
         return state.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
     possible = ', or '.join(f'{c.best} ({percent(c.probability)})' for c in others[:3])
     unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
@@ -248,9 +252,3 @@ def _others(state: DiagnosisState, probabilities: Mapping[str, float]) -> tuple[
         fit = state.fitted_with(effects, state.fit.model)
         found.append(state.described((cause,), probability, state.history[-1], fit))
     return tuple(found)
-
-
-def _in_words(found: EffectClass) -> str:
-    if len(found.members) == 1:
-        return found.best
-    return f'{found.best} (or, not distinguishable here, {", ".join(found.members[1:])})'

@@ -189,12 +189,11 @@ class SearchStage:
 
     def chosen(self, rows: np.ndarray | None = None) -> EffectSet:
         """The set that the readings, or some (P,), call for: one that was tried, or this."""
-
-        def weight(trial: EffectSet) -> float:
-            return trial.log_weight if rows is None else trial.log_weight_of(rows)
-
-        weights = [weight(trial) for trial in self.tried]
-        if not weights or inclusion_of(weights, [weight(self.here)]) <= SURE:
+        here, *weights = (
+            one.log_weight if rows is None else one.log_weight_of(rows)
+            for one in (self.here, *self.tried)
+        )
+        if not weights or inclusion_of(weights, [here]) <= SURE:
             return self.here
         return self.tried[int(np.argmax(weights))]
 

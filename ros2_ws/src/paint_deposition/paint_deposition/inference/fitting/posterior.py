@@ -34,6 +34,8 @@ def posterior_of(
 ) -> Posterior:
     """The posterior of a fit to a campaign, widened as ``scaled_covariance`` is.
 
+    It is as narrow as that of the best fit beside the discrepancy.
+
     Args:
         figures: of the discrepancy, if they are known. Where the fit has learned the footprint,
             it is off by as much as the readings leave open.
@@ -45,7 +47,7 @@ def posterior_of(
         footprint = float(f'{footprint[0]:.3g}'), float(f'{footprint[1]:.3g}')
     parameters = fit.parameters
     scale, shifts = parameters.scale, with_mean_level(fit, campaign, shifts)
-    covariance = scaled_covariance(fit, shifts) * np.outer(scale, scale)
+    covariance = scaled_covariance(fit.marginal, shifts) * np.outer(scale, scale)
     known = parameters.known.readings if parameters.known else ()
     return Posterior.of(
         parameters.coordinates, parameters.offset + scale * fit.vector,

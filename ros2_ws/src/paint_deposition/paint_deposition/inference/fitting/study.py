@@ -301,16 +301,14 @@ class Study:
         found = []
         for fold in np.unique(folds):
             out = folds == fold
-            found.append(np.apply_along_axis(self._errors_um, -1, predict(out), out))
+            films_um = predict(out)
+            errors_um = np.zeros(films_um.shape)
+            for row in np.ndindex(films_um.shape[:-1]):
+                levels = levels_untold(self.campaign, films_um[row], self.sigma_um, ~out)[out]
+                misfit = ((self.measured_um - films_um[row]) / self.sigma_um)[out]
+                errors_um[row][out] = self.sigma_um[out] * _beside(levels, misfit)
+            found.append(errors_um)
         return np.sum(found, axis=0) ** 2
-
-    def _errors_um(self, film_um: np.ndarray, out: np.ndarray) -> np.ndarray:
-        """(P,) errors of a film (P,) on points left out, beside levels untold; 0 elsewhere."""
-        levels = levels_untold(self.campaign, film_um, self.sigma_um, ~out)[out]
-        errors_um = np.zeros(len(self))
-        misfit = ((self.measured_um - film_um) / self.sigma_um)[out]
-        errors_um[out] = self.sigma_um[out] * _beside(levels, misfit)
-        return errors_um
 
     @property
     def _facet_notes(self) -> tuple[str, ...]:
