@@ -2,37 +2,16 @@
 
 import json
 import re
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks import scores
 from benchmarks.diagnosis import main as score_the_diagnosis
-from benchmarks.live import ages_s
-from benchmarks.page import page_of, with_output
-from benchmarks.records import add
+from benchmarks.page import page_of
 from click.testing import CliRunner
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-def test_a_pose_is_as_old_as_the_first_statistics_that_know_it():
-    ms = 1_000_000
-    stamps = ms * np.array([0, 100, 200, 300])
-    # Stamp of the newest pose in the statistics, and when they arrived.
-    arrived = [(50 * ms, 60 * ms), (200 * ms, 230 * ms), (200 * ms, 400 * ms)]
-    np.testing.assert_allclose(ages_s(stamps, arrived), [0.06, 0.13, 0.03, np.inf])
-
-
-def test_only_the_place_of_the_benchmark_changes():
-    text = (
-        'before\n<!-- measured: a -->\nold\n<!-- end -->\n'
-        'between\n<!-- measured: b -->\nkept\n<!-- end -->\n'
-    )
-    new = with_output(text, 'a', r'a \1 line' + '\n', 'a.py, today')
-    assert new.startswith('before\n<!-- measured: a -->\n\n```\na.py, today\na \\1 line\n```\n')
-    assert new.endswith('between\n<!-- measured: b -->\nkept\n<!-- end -->\n')
 
 
 def test_every_place_has_a_benchmark_that_fills_it(tmp_path):
@@ -45,14 +24,6 @@ def test_every_place_has_a_benchmark_that_fills_it(tmp_path):
         assert f'benchmarks.page {name} ' in makefile, name
     with pytest.raises(SystemExit, match='0 pages'):
         page_of('a', tmp_path)
-
-
-def test_tasks_run_as_the_cases_of_a_sweep_and_join_the_kept_records(tmp_path, monkeypatch):
-    monkeypatch.setattr('benchmarks.records.workers', lambda: ThreadPoolExecutor(1))
-    results = tmp_path / 'results.jsonl'
-    results.write_text('{"task": [0]}\n')
-    records = add(results, lambda task: [{'task': task}], [(1,), (2,), (2,)])
-    assert sorted(record['task'] for record in records) == [[0], [1], [2]]
 
 
 def test_the_diagnosis_is_scored_from_what_was_kept(tmp_path):

@@ -94,12 +94,3 @@ def test_foreign_paths_become_ours_and_relative_ones_stay(elsewhere):
     assert REPAIR['repaired'](foreign) == HERE
     for text in (HERE, relative):
         assert REPAIR['repaired'](text) == text
-
-
-def test_a_hard_link_elsewhere_keeps_its_text(tmp_path):
-    cached, installed = tmp_path / 'cached', tmp_path / 'installed'
-    cached.write_text('as built')
-    installed.hardlink_to(cached)
-    REPAIR['replace'](installed, 'repaired')
-    assert (installed.read_text(), cached.read_text()) == ('repaired', 'as built')
-    assert sorted(tmp_path.iterdir()) == [cached, installed]

@@ -132,6 +132,12 @@ def test_sprays_that_differ_more_than_usual_ones_are_told(plain, discrepancy, fe
     assert large > 0.7 * NULL_RUNS
 
 
+def test_one_point_far_off_is_told_where_the_fields_are_usual(plain, discrepancy):
+    far = shifted(plain, np.where(np.arange(READINGS) == READINGS // 2, 9.0, 0.0))
+    off, nothing = (space_of(null, [], discrepancy, USUAL) for null in (far, plain))
+    assert off.p_values(seed=0)[1] < 0.05 < nothing.p_values(seed=0)[1]
+
+
 @pytest.mark.parametrize('freedom', [np.inf, 12.0])
 def test_odds_are_those_of_densities_averaged_over_sizes_and_shapes(plain, discrepancy, freedom):
     """What differs by more than nature's settings do counts as unknown."""

@@ -84,6 +84,16 @@ def test_slips_do_not_hide_each_other_and_many_and_those_read_again_are_none():
     assert find_outliers(slipped(scattered(2), 5, 9.0 * FILM_UM), again) == {}
 
 
+@pytest.mark.parametrize(('rows', 'slips'), [([0], 1), ([0, 1, 2], 0), ([0, 40], 2)])
+def test_neighbours_that_are_off_the_same_way_are_no_slips(rows, slips):
+    """As on a stripe. Numbers count from one point outward."""
+    misfit = scattered(2)
+    away_m = np.linalg.norm(misfit.positions_m - misfit.positions_m[40], axis=1)
+    for row in np.argsort(away_m)[rows]:
+        misfit = slipped(misfit, row, -0.3 * FILM_UM)
+    assert len(find_outliers(misfit, EVERY)) == slips
+
+
 def test_a_prediction_without_the_reading_is_that_of_the_others_alone():
     """The closed form against a mixture that has never seen the reading."""
     # Without covariates, whose scale would be that of the readings.
@@ -133,6 +143,8 @@ def test_a_typing_error_does_not_change_the_verdict(tmp_path):
     assert outlier['guess_um'] == pytest.approx(0.1 * outlier['thickness_um'])
     left_out = [note for note in found.notes if "point 'door: " in note]
     assert ['left out of the fit' in note for note in left_out] == [True]
+    study, _ = cleaning.clean_and_fit(bad, pd.DepositionModel(), sound=[outlier['point']])
+    assert study.outliers == ()
     compared = pd.compare(bad, found.history[0].model)
     assert [one.point for one in compared.study.outliers] == [str(bad.readings.point[row])]
 

@@ -1,6 +1,7 @@
 """Levels of parts and zeros of gauge sessions, and what is predicted of a part left out."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -137,6 +138,11 @@ def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth
     assert step.holdout_rmse_um == pytest.approx(found)
     assert step.holdout_rmse_um == pytest.approx(anew, rel=0.02)
     assert step.holdout_rmse_um > step.rmse_um
+    # Points left out here and there have the level that the rest of their part tells.
+    if truth is BASE:
+        without = partial(study.predicted_without_um, fit)
+        squares_um2 = study.squares_left_out_um2(without, study.scattered())
+        assert np.sqrt(np.mean(squares_um2)) < 1.25 * study.noise_floor_um
 
 
 @pytest.mark.slow
