@@ -2,16 +2,9 @@
 
 import numpy as np
 import pytest
-from matplotlib import colormaps
 
 from paint_deposition.report import colour_scales as colours
-from paint_deposition.report.colour_scales import FILM_PALETTE, RESIDUAL_PALETTE, film_scale
-
-
-def test_the_tables_are_the_published_maps():
-    for name, palette in {'viridis': FILM_PALETTE, 'coolwarm': RESIDUAL_PALETTE}.items():
-        published = colormaps[name](np.arange(256))[:, :3] * 255
-        assert np.abs(palette[:256, :3] - published).max() <= 0.5
+from paint_deposition.report.colour_scales import FILM_PALETTE, film_scale
 
 
 def test_under_over_and_bare_stand_out_and_the_residual_is_even_about_zero():
