@@ -283,7 +283,9 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, how: str = 'added ') -> Iterator[s
         if isinstance(law, LearnedCurve) and law.sd:
             yield f'    {words.form_words(law)}'
         for name, value in effects.parameters.items():
-            yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
+            ends = f'({value.low:.4g} to {value.high:.4g})'
+            why = f'; {value.reason}' if value.reason else ''
+            yield f'    {name} = {value.value:.4g} {ends}{why}'
     before, after = diagnosis.history[0], diagnosis.history[-1]
     nested = f' ({after.nested_rmse_um:.2f} where what is missing is sought anew without each)'
     yield (

@@ -193,7 +193,7 @@ def class_rows(data: ReportData) -> list[dict[str, Any]]:
         effect = data.effect_class(found.best)
         like = [member for member in found.members if member != found.best]
         parameters = [
-            _parameter(effect, name, one.value, one.low, one.high)
+            _parameter(effect, name, one.value, one.low, one.high) | {'reason': one.reason}
             for name, one in found.parameters.items()
         ]
         accepted = data.diagnosis is not None and found.best in data.diagnosis.accepted

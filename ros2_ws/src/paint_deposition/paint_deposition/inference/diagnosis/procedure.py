@@ -229,7 +229,7 @@ def _conclude(
     for over in (c.best.removeprefix('learned:') for c in state.accepted):
         alike = [n for n, shapes in state.candidates.items() if over in shapes[0].covariates]
         if alike:
-            reason += f' Effects that depend on it with another law: {", ".join(alike)}.'
+            reason += f' Effects that depend on {over} by another law: {", ".join(alike)}.'
     if len(set(best.usual.setting_of)) == 1:
         reason += (
             ' All parts were painted alike: it may belong to the part or to the spray. Spray '

@@ -41,6 +41,7 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
     learned = np.sqrt(np.diag(covariance)) <= 0.5 * weak.width
     # So many standard deviations of it away no bell is.
     strange = np.abs(fit.vector - weak.centre) > 3.0 * weak.width
+    at_low, at_high = np.isclose(fit.vector, fit.parameters.bounds, rtol=0.0, atol=1e-3)
     values = fit.parameters.values(fit.vector[np.newaxis])[0]
     pattern, found = fit.parameters.pattern, []
     random = np.random.default_rng(0)
@@ -59,6 +60,8 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
         else:
             entry = k - len(pattern.names) + len(pattern)
             reason = '' if learned[entry] else 'its effect hardly shows at these points'
+            if at_low[entry] or at_high[entry]:
+                reason = 'it is at the bound of what is physical: its law may be another'
         value, sd, least, most = (float(of[k]) for of in (values, sigma, low, high))
         found.append(Estimate(name, value, sd, least, most, not reason, reason))
     return tuple(found)
