@@ -231,15 +231,15 @@ def _without_features(
     Args:
         left: the others, which are the rows ``kept`` of all.
     """
-    # Places on parts so far from each other are no neighbours [m].
-    places_m = np.column_stack([misfit.positions_m, 1e6 * misfit.experiment_of])
     slips = found
     for row, (mean_um, _, other) in found.items():
         off_um = misfit.residual_um[row] - mean_um
         if abs(off_um) > 0.5 * misfit.predicted_um[row]:
             continue
-        # Its four nearest neighbours, after itself.
-        for near in np.argsort(np.linalg.norm(places_m - places_m[row], axis=1))[1:5]:
+        own = np.flatnonzero(misfit.experiment_of == misfit.experiment_of[row])
+        away_m = np.linalg.norm(misfit.positions_m[own] - misfit.positions_m[row], axis=1)
+        # Its four nearest neighbours on the part, after itself.
+        for near in own[np.argsort(away_m)[1:5]]:
             if near in found:
                 expected_um, sigma_um, _ = found[near]
             else:
