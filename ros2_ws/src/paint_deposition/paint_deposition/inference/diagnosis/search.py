@@ -39,6 +39,7 @@ from paint_deposition.inference.diagnosis.model_space import (
     probable_hyperparameters,
 )
 from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
+from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.inference.fitting.least_squares import Fit
 
 # So many effects are tried beside an effect.
@@ -52,6 +53,8 @@ MIN_LOG_EVIDENCE_GAIN = 12.0
 # Odds that something outside the library acts just as an effect of it would: of the effects named
 # with certainty, in campaigns of which a fifth hid something else, about a tenth were not there.
 ALIKE = 0.1
+# An effect that makes the error on parts left out so many times as large is none.
+MOST_WORSE = 1.15
 # Effects that could stand in one place, most probable first, and the probability of one of them.
 Group = tuple[tuple[str, ...], float]
 
@@ -347,10 +350,19 @@ class Search:
                 others = self.without(trial, better[0])
                 trial = self.with_effect(others, found[better[0]][0][0])
                 continue
-            sure = SURE_BESIDE if len(found) > 1 else SURE
-            if not found or min(p for _, p in found.values()) > sure:
+            if not found:
                 return trial, found
-            trial = self.without(trial, min(found, key=lambda name: found[name][1]))
+            weakest = min(found, key=lambda name: found[name][1])
+            if found[weakest][1] > (SURE_BESIDE if len(found) > 1 else SURE):
+                study, error_um = self.state.study, {}
+                for names in ((), *((name,) for name in found)):
+                    fewer = self.without(trial, *names) if names else trial
+                    error_um[names] = Step.of(study, '', fewer.result).holdout_rmse_um
+                least = min(error_um, key=error_um.__getitem__)
+                if error_um[()] <= MOST_WORSE * error_um[least]:
+                    return trial, found
+                (weakest,) = least
+            trial = self.without(trial, weakest)
             unknown = self._log_odds(trial, {})[UNKNOWN] > 0.0
             judged = {name: members for name, (members, _) in found.items()} if unknown else {}
 
