@@ -117,10 +117,7 @@ def test_a_case_that_fails_says_so_and_is_tried_again(tmp_path):
         assert good == 8 * [{'mean_um': 20.0, 'error': None}]
         assert bad['error'] == 'not computed: ZeroDivisionError: division by zero'
         assert deadly['error'].startswith('not computed: KilledWorker: ')
-    assert {path.stem for path in tmp_path.glob('*.parquet')} == {*texts} - {
-        'deadly',
-        'bad',
-    }
+    assert {path.stem for path in tmp_path.glob('*.parquet')} == {*texts} - {'deadly', 'bad'}
 
 
 def test_a_folder_is_of_one_command_at_a_time_and_without_dask_this_process_computes(

@@ -22,6 +22,7 @@ from paint_deposition.part.surface import toward_the_guns
 
 MOTION = two_passes()
 STREAM = """
+import time
 from nodes.cell import Robot, two_passes
 from rclpy.context import Context
 
@@ -30,7 +31,9 @@ context.init()
 robot, motion = Robot(context), two_passes(trigger=False)
 print('ready', flush=True)
 while True:
-    robot.send(motion)
+    for first in range(0, len(motion), 10):
+        robot.send(motion, slice(first, first + 10))
+        time.sleep(0.005)
 """
 LISTENER = """
 import rclpy
@@ -127,7 +130,7 @@ def test_who_sends_faster_than_it_takes_does_not_hold_the_node(simulator, robot)
 def test_no_pose_is_left_out_while_it_activates_itself(
     ros_domain, simulator, wait_until, tmp_path, monkeypatch, repository
 ):
-    """Poses that come between its first subscription and its first callback are painted."""
+    """Of a gun at 2 kHz, poses between the first subscription and the first callback count."""
     monkeypatch.setenv('PYTHONPATH', str(repository / 'tests'), prepend=':')
     with NodeProcess(tmp_path / 'robot', '', code=STREAM) as robot:
         wait_until(lambda: 'ready' in robot.out, what='the robot')

@@ -98,7 +98,7 @@ def _lines(
     """
     # 'column 2' before 'column 10': text and numbers in turn.
     parts = {str(g): re.split(r'(\d+)', str(g)) for g in experiment.groups if g}
-    labels = sorted(parts, key=lambda g: [int(p) if p.isdigit() else p for p in parts[g]])
+    labels = sorted(parts, key=lambda g: [int(p) if p.isdecimal() else p for p in parts[g]])
     for label in labels:
         members = np.flatnonzero(experiment.groups == label)
         yield label, members, np.ptp(height_m[members]) >= np.ptp(across_m[members]), False

@@ -127,7 +127,7 @@ class Footprints:
         # Both are of the flux alone: effects would bend the one and not the other.
         bare = fit.parameters.pattern.jacobian(fit.vector[: len(fit.parameters.pattern)])
         readings_of = study.forward.of_weights(fit.model.model_copy(update={'effects': ()}))
-        by_pattern = derivatives_by_pattern(readings_of, fit.model.patterns)
+        _, by_pattern = derivatives_by_pattern(readings_of, fit.model.patterns)
         pattern = by_pattern @ bare / study.sigma_um[:, np.newaxis]
         columns, laws = [], []
         for size in PRIOR.footprints:

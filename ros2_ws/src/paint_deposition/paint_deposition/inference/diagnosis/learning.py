@@ -35,6 +35,8 @@ LEAST_GAIN = 0.02
 Sized = tuple[Explanation, float]
 
 
+# (n, P) films [um] by the covariates without a law, the identity of the set, and what is left out.
+Films = dict[tuple[frozenset[str], int, bytes], np.ndarray]
 # Null hypotheses by what kind of law must say more than them, see ``nulls_around``.
 Nulls = Mapping[str, NullModel]
 CORRECTION, OTHER = 'correction', 'other'
@@ -125,11 +127,12 @@ class LeftOut:
         stages: of the search.
         final: the set that remained of the last one.
         options: laws of any form that may be learned.
+        films_um: that were predicted already for the same final set and options.
     """
 
     def __init__(
         self, nothing: EffectSet, stages: Sequence[SearchStage], final: EffectSet,
-        options: Sequence[Explanation],
+        options: Sequence[Explanation], films_um: Films | None = None,
     ) -> None:  # fmt: skip
         self.nothing, self.stages, self.final, self.options = nothing, stages, final, options
         self.study = final.state.study
@@ -139,6 +142,8 @@ class LeftOut:
             FOOTPRINT: self.study.patches,
         }
         self._known: dict[tuple[frozenset[str], str], np.ndarray] = {}
+        self._films_um: Films = {} if films_um is None else films_um
+        self._finds_nothing: dict[int, bool] = {}  # by fold, whether the test says so
 
     def errors_by_count_um(
         self,
@@ -193,12 +198,15 @@ class LeftOut:
         nothing, folds = self.nothing, self.study.folds()
         unaware = LeftOut(nothing, [SearchStage(nothing, [])], nothing, ())
         squares_um2 = np.zeros(len(folds))
-        for out in (folds == fold for fold in np.unique(folds)):
-            if nothing is not self.final:
-                p_values = nothing.space.select(~out).p_values(nothing.state.seed)
-                if min(p_values) >= ALPHA:
-                    squares_um2[out] = unaware.errors_by_count_um(rows=out)[0] ** 2
-                    continue
+        for fold in np.unique(folds).tolist():
+            out = folds == fold
+            if fold not in self._finds_nothing:
+                self._finds_nothing[fold] = nothing is not self.final and (
+                    min(nothing.space.select(~out).p_values(nothing.state.seed)) >= ALPHA
+                )
+            if self._finds_nothing[fold]:
+                squares_um2[out] = unaware.errors_by_count_um(rows=out)[0] ** 2
+                continue
             count = self.borne_out(laws, without, ~out)
             squares_um2[out] = self.errors_by_count_um(without, rows=out)[count] ** 2
         error_um = float(np.sqrt(np.mean(squares_um2)))
@@ -208,9 +216,10 @@ class LeftOut:
     @cached_property
     def keeping_effects(self) -> 'LeftOut':
         """The same if every fold keeps the effects found with all readings, and refits them."""
-        final = self.final
-        kept = self.nothing is final
-        return self if kept else LeftOut(final, [SearchStage(final, [])], final, self.options)
+        if self.nothing is self.final:
+            return self
+        final, stages = self.final, [SearchStage(self.final, [])]
+        return LeftOut(final, stages, final, self.options, self._films_um)
 
     def _predicted(self, without: frozenset[str], out: np.ndarray) -> np.ndarray:
         """(n, P) films with 0 to n - 1 laws, found without some readings (P,) [um]."""
@@ -223,6 +232,9 @@ class LeftOut:
                 break
         else:
             found = self.final
+        key = without, id(found), out.tobytes()
+        if key in self._films_um:
+            return self._films_um[key]
         nulls = of_readings(nulls_around(found, found.fit), ~out)
         laws = choose_laws(nulls, [option.select(~out) for option in options], freedom)
         learned = [size * options[k].columns for k, size in laws]
@@ -230,7 +242,8 @@ class LeftOut:
         for count in range(1, len(learned) + 1):
             free = np.hstack(learned[:count])
             films_um.append(study.predicted_without_um(found.fit, out, free))
-        return np.array(films_um + films_um[-1:] * (MOST_LAWS - len(learned)))
+        films_um += films_um[-1:] * (MOST_LAWS - len(learned))
+        return self._films_um.setdefault(key, np.array(films_um))
 
 
 def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) -> Unknown:

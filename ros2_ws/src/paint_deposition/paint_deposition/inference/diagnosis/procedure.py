@@ -96,8 +96,8 @@ def diagnose(
     state = _accept(state, fit, groups, left_out.errors_um())
     progress('learning what the laws leave unexplained')
     state = _learn(state, best, left_out)
-    explained = _explained_outliers(campaign, state.study.outliers, state.fit.model)
-    if explained and not sound:
+    outliers = () if sound else state.study.outliers  # it is done anew once
+    if explained := _explained_outliers(campaign, outliers, state.fit.model):
         progress('readings that looked wrong agree with what was found: diagnosing with them')
         return diagnose(campaign, start, library, seed, progress, known, explained)
     return _conclude(state, best, _others(state, search.beside(best, sought)), p_value)
@@ -109,6 +109,8 @@ def _explained_outliers(
     """Labels of outliers that a model explains: by more than half, and to within their scatter."""
     readings = campaign.readings
     labels = readings.point[readings.first].tolist()
+    if not {one.point for one in outliers} & {*labels}:  # none, or cells of a scan
+        return frozenset()
     film_um = dict(zip(labels, Forward(campaign, model.effects).predict_um(model), strict=True))
     return frozenset(
         one.point

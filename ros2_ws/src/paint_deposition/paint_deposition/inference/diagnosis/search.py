@@ -95,6 +95,11 @@ class EffectSet:
         )
 
     @cached_property
+    def error_um(self) -> float:
+        """Of the result on parts left out, refitted without them [um]."""
+        return Step.of(self.state.study, '', self.result).holdout_rmse_um
+
+    @cached_property
     def discrepancy(self) -> ModelDiscrepancy:
         """The discrepancy beside the model."""
         return self.usual.around(self.state.study, self.fit)
@@ -355,15 +360,12 @@ class Search:
                 return trial, found
             weakest = min(found, key=lambda name: found[name][1])
             if found[weakest][1] > (SURE_BESIDE if len(found) > 1 else SURE):
-                study, error_um = self.state.study, {}
-                doubted = [(n,) for n, (like, p) in found.items() if p < SETTLED and like == (n,)]
-                for names in ((), *doubted):
-                    fewer = self.without(trial, *names) if names else trial
-                    error_um[names] = Step.of(study, '', fewer.result).holdout_rmse_um
-                least = min(error_um, key=error_um.__getitem__)
-                if error_um[()] <= MOST_WORSE * error_um[least]:
+                doubted = [n for n, (like, p) in found.items() if p < SETTLED and like == (n,)]
+                fewer = {n: self.without(trial, n).error_um for n in doubted}
+                worse = [n for n in doubted if trial.error_um > MOST_WORSE * fewer[n]]
+                if not worse:
                     return trial, found
-                (weakest,) = least
+                weakest = min(worse, key=fewer.__getitem__)
             trial = self.without(trial, weakest)
             unknown = self._log_odds(trial, {})[UNKNOWN] > 0.0
             judged = {name: members for name, (members, _) in found.items()} if unknown else {}

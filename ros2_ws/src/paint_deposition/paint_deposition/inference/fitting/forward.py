@@ -80,13 +80,14 @@ class Forward:
 
 def derivatives_by_pattern(
     readings_of: OfWeights, patterns: Sequence[PlanarPattern]
-) -> np.ndarray:
-    """(P, 7 B) derivatives of the readings by each pattern, as of ``layout.term_weights`` [um]."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """(P,) readings and (P, 7 B) their derivatives by the patterns, see ``layout`` [um]."""
     weights = [term_weights(planar) for planar in patterns]
     film = np.concatenate([film for film, _ in weights])
     rows = block_diag(*(rows for _, rows in weights))
     ends = [(readings_of(film + STEP * w), readings_of(film - STEP * w)) for w in rows]
-    return np.column_stack([(above - below) / (2.0 * STEP) for above, below in ends])
+    slopes = np.column_stack([(above - below) / (2.0 * STEP) for above, below in ends])
+    return readings_of(film), slopes
 
 
 class _Part:

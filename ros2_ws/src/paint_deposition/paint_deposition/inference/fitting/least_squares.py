@@ -208,9 +208,8 @@ def derivatives(
     """
     model, count = parameters.decode(vector), len(parameters.pattern)
     readings_of = readings_of or forward.of_weights(model)
-    by_pattern = derivatives_by_pattern(readings_of, model.patterns)
+    here, by_pattern = derivatives_by_pattern(readings_of, model.patterns)
     columns = [by_pattern @ parameters.pattern.jacobian(vector[:count])]
-    here = readings_of(gains(model))
     _, high = parameters.bounds
     for k in range(count, len(vector)):
         step = STEP if vector[k] + STEP <= high[k] else -STEP
@@ -219,11 +218,6 @@ def derivatives(
         change = forward.predict_um(parameters.decode(moved)) - here
         columns.append(change[:, np.newaxis] / step)
     return np.hstack(columns) / sigma_um[:, np.newaxis]
-
-
-def gains(model: DepositionModel) -> np.ndarray:
-    """(7 B,) weights of the terms of its patterns, see ``layout.term_weights``."""
-    return np.concatenate([term_weights(planar)[0] for planar in model.patterns])
 
 
 class _Problem:
@@ -255,7 +249,9 @@ class _Problem:
 
     def predict(self, vector: np.ndarray, readings_of: OfWeights | None = None) -> np.ndarray:
         """(P,) readings [um]; ``readings_of`` is that of a vector that differs in gains only."""
-        return (readings_of or self.of_weights(vector))(gains(self.parameters.decode(vector)))
+        patterns = self.parameters.decode(vector).patterns
+        weights = np.concatenate([term_weights(planar)[0] for planar in patterns])
+        return (readings_of or self.of_weights(vector))(weights)
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
         return columns if self.lower is None else solve_triangular(self.lower, columns, lower=True)

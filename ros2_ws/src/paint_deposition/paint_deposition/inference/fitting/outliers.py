@@ -137,6 +137,8 @@ PRIOR_PROBABILITY, LEAST_PROBABILITY = 0.01, 0.9
 FEWEST_POINTS = 20
 # A corrected value is proposed if it is within this many standard deviations of the expected one.
 GUESS_SIGMAS = 3.0
+# A neighbour that is off the same way by more standard deviations shows a feature of the part.
+NEIGHBOUR_SIGMAS = 3.0
 
 
 @dataclass(frozen=True)
@@ -246,7 +248,7 @@ def _without_features(
                 there = int(np.searchsorted(kept, near))
                 expected_um, sigma_um = left.predicted_by_others(there)
             away = (misfit.residual_um[near] - expected_um) / sigma_um
-            if away * np.sign(off_um) > GUESS_SIGMAS:
+            if away * np.sign(off_um) > NEIGHBOUR_SIGMAS:
                 slips = {k: v for k, v in slips.items() if k not in (row, other)}
     return slips
 
