@@ -88,7 +88,7 @@ def compare(
         another = 'the model may be for another flow, or of another gun: calibrate it'
         warnings = (f'the readings say {ratio:.2g} times the K1 of the model; {another}',)
     if not warnings:
-        warnings = tuple(filter(None, [study.level_doubt(fit.predicted_um)[1]]))
+        warnings = tuple(filter(None, [study.level_doubt(fit)[1]]))
     return replace(found, warnings=warnings)
 
 

@@ -112,9 +112,9 @@ def contenders_of(
 ) -> tuple[Contender, ...]:
     """What competes for a diagnosis: nothing if fewer than two explanations do.
 
-    These are the members of the first group that has several; else, where nothing is accepted,
-    the leading effects and the shapeless cause, if that is what the verdict names. A pattern that
-    is no two Gaussians may always stand in their place.
+    These are the members of the first group that has several; else, where nothing is accepted or
+    something is missing beside it, the leading effects and the shapeless cause, if that is what
+    the verdict names. A pattern that is no two Gaussians may always stand in their place.
     """
     names = _competing(diagnosis, library)
     if not names:
@@ -166,9 +166,11 @@ def _competing(diagnosis: Diagnosis, library: Mapping[str, type[Effect]]) -> tup
     ]
     if several:
         return several[0][:MOST_CONTENDERS]
-    if any(found in library for found in diagnosis.accepted):
+    accepted = diagnosis.accepted
+    if diagnosis.unknown is None and any(found in library for found in accepted):
         return ()
-    return tuple(c.best for c in diagnosis.classes if c.best in library)[:MOST_CONTENDERS]
+    left = [c.best for c in diagnosis.classes if c.best in library and c.best not in accepted]
+    return tuple(left[:MOST_CONTENDERS])
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,8 @@ def diagnose(
     search = Search(state)
     nothing = search.nothing
     testable = testability(nothing.space.central, seed)
-    state = replace(state, testable=testable, figures=nothing.space.figures)
+    usual = nothing.best.null.discrepancy
+    state = replace(state, testable=testable, figures=nothing.space.figures, discrepancy=usual)
     p_value = min(nothing.p_values)
     if p_value >= ALPHA:
         return _nothing_missing(state, nothing, p_value)
@@ -142,7 +143,7 @@ def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) 
     # Errors this many times as large as the noise of gauge and texture need a word.
     if first.rmse_um < 1.1 * noise_um:
         reason = 'The readings agree with the model to within gauge and texture.'
-    p_of_levels, doubt = state.study.level_doubt(first.fit.predicted_um)
+    p_of_levels, doubt = state.study.level_doubt(replace(first.fit, discrepancy=state.discrepancy))
     if doubt:
         reason = f'{doubt} Beside it: {reason[0].lower()}{reason[1:]}'
         return state.diagnosis(min(p_value, p_of_levels), 'unknown_effect', reason)
@@ -209,14 +210,20 @@ def _conclude(
 ) -> Diagnosis:
     """The verdict on what was found."""
     named = [c for c in state.accepted if not c.best.startswith('learned:')]
+    possible = ', or '.join(f'{c.best} ({percent(c.probability)})' for c in others[:3])
     if named:
         alike = [', '.join(c.members[1:]) for c in named]
         names = ', and '.join(
             f'{c.best} (or, not distinguishable here, {others})' if others else c.best
             for c, others in zip(named, alike, strict=True)
         )
-        return state.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
-    possible = ', or '.join(f'{c.best} ({percent(c.probability)})' for c in others[:3])
+        reason, rest = f'The readings show {names}.', None
+        # A law that was learned is the rest.
+        if len(named) == len(state.accepted) and min(best.p_values) < ALPHA:
+            rest = locate_unexplained(state.study, state.fit, best, state.seed)
+            reason += f' They show more than that (p = {min(best.p_values):.2g}). {rest}'
+            reason += f' It may be {possible}.' if others else ''
+        return state.diagnosis(p_value, 'effect_missing', reason, others, rest)
     unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
     # Where a law was learned something unknown acts, whatever may act beside it.
     enough = 0.5 if unknown.part or unknown.p_value < ALPHA else 0.1
@@ -224,7 +231,7 @@ def _conclude(
         reason = f'These may be missing: {possible}'
         return state.diagnosis(p_value, 'undecided', reason, others)
     reason = f'Something is missing that no effect of the library explains. {unknown}'
-    p_of_levels, doubt = state.study.level_doubt(state.fit.predicted_um)
+    p_of_levels, doubt = state.study.level_doubt(replace(state.fit, discrepancy=state.discrepancy))
     # What is far less probable comes first.
     if doubt and p_of_levels < 0.1 * p_value:
         reason = f'{doubt} {reason}'

@@ -194,7 +194,7 @@ class Diagnosis:
         """Why what was known before does not suit this job, a sentence each."""
         shift, doubt = self.pattern_shift, ''
         if self.verdict != 'fit_broken':
-            _, doubt = self.study.level_doubt(self.history[-1].fit.predicted_um)
+            _, doubt = self.study.level_doubt(self.history[-1].fit)
         moved = (shift.warning,) if shift and shift.is_alarming else ()
         return (*moved, *((doubt,) if doubt not in self.reason else ()), *self.remarks)
 

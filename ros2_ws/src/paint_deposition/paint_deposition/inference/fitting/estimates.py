@@ -59,7 +59,7 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
             reason = _pattern_reason(PATTERN_NAMES[place], values[k], sigma[k], *known)
         else:
             entry = k - len(pattern.names) + len(pattern)
-            reason = '' if learned[entry] else 'its effect hardly shows at these points'
+            reason = '' if learned[entry] else 'these points hardly tell its size'
             if at_low[entry] or at_high[entry]:
                 reason = 'it is at the bound of what is physical: its law may be another'
         value, sd, least, most = (float(of[k]) for of in (values, sigma, low, high))

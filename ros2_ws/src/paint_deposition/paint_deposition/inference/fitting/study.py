@@ -221,22 +221,19 @@ class Study:
         """(P, n) nuisance directions over the noise: those of the random effects."""
         return _columns(self.random_effects, len(self))
 
-    def level_doubt(self, predicted_um: np.ndarray) -> tuple[float, str]:
-        """Probability that usual parts and gauge sessions differ so, and how; '' if they may.
-
-        Args:
-            predicted_um: (P,) film of a model [um].
-        """
-        columns, effects = self.nuisance, self.random_effects
+    def level_doubt(self, fit: Fit) -> tuple[float, str]:
+        """Probability that usual parts and gauge sessions differ so, and how; '' if they may."""
+        effects = self.random_effects
         if not effects:
             return 1.0, ''
-        misfit = (self.measured_um - predicted_um) / self.sigma_um
         # Amplitudes of unit variance, and the share of it that the readings tell.
-        covariance = np.linalg.inv(np.eye(columns.shape[1]) + columns.T @ columns)
-        mean = covariance @ (columns.T @ misfit)
+        mean, covariance = fit.amplitudes
         shares, ways = np.linalg.eigh(np.eye(len(mean)) - covariance)
         seen = shares > 0.5
         square = float(np.sum((ways[:, seen].T @ mean) ** 2 / shares[seen]))
+        if fit.discrepancy is None:  # what else is missing may look like levels
+            rmse_um = self.residuals(fit.predicted_um).rmse_um
+            square /= max(rmse_um / self.noise_floor_um, 1.0) ** 2
         p_value = float(chi2.sf(square, np.count_nonzero(seen)))
         if p_value > UNUSUAL:
             return p_value, ''
@@ -247,6 +244,7 @@ class Study:
             told = ', '.join(f'{one.of} {one.value:+.1f} {one.unit}' for one in found)
             steps = np.diff([one.value for one in found])
             way = ', rising' if (steps > 0.0).all() else ', falling' if (steps < 0.0).all() else ''
+            way *= len(found) > 2
             levels.append(f'{kind}s {told}{way}')
         return p_value, (
             f'The levels of the parts differ by more than usual (p = {p_value:.2g}): '
