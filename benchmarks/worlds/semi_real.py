@@ -122,7 +122,9 @@ def draw_job(
     middle = 0.5 * (time[1:] + time[:-1])
     step = (number[1:] == number[:-1]) & (number[1:] >= 0)
     place = np.tile(0.5 * (way[1:] + way[:-1]), count)
-    kept = np.unique(np.append(np.arange(0, len(time), round(POSE_M / STEP_M)), len(time) - 1))
+    # A slow gun, too, sends five times a second.
+    every = min(round(POSE_M / STEP_M), max(int(0.2 * speed / STEP_M), 1))
+    kept = np.unique(np.append(np.arange(0, len(time), every), len(time) - 1))
     return Job(
         middle[step], gaps[step], 0.5 * (tcp[1:] + tcp[:-1])[step], turn[:-1][step],
         np.array(opens), number[:-1][step], 0.5 * along + run - np.abs(place), lines, upright,
