@@ -1,6 +1,5 @@
 """Learned laws: curves over a covariate, maps of a part, and the footprint of the spray."""
 
-import pickle
 from dataclasses import fields
 
 import numpy as np
@@ -10,7 +9,6 @@ from numba import float32, float64, njit
 import scenes
 from booth import MODEL, door, painted, panel, path_of, serpentine, spot
 from paint_deposition.effects import learned_laws as laws
-from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.learned_curves import CURVES, LearnedCurve, along_path, at_points
 from paint_deposition.effects.learned_laws import LearnedFootprint, LearnedMap, PartGrid, places_m
 from paint_deposition.film.pass_film import collapse_um
@@ -145,15 +143,6 @@ def test_a_pass_by_itself_knows_no_time_and_no_number(covariate):
     plain = collapse_um(MODEL, across, 0.3)
     with_law = collapse_um(MODEL.with_effect(law), across, 0.3)
     np.testing.assert_allclose(with_law, plain, rtol=0.0, atol=2e-6 * plain.max())
-
-
-@LAW
-def test_it_is_called_by_its_covariate(law):
-    assert effect_class(f'learned:{law.covariate}') is law
-    assert law.id not in EFFECTS
-    assert law.__doc__
-    assert law.over in law.__doc__
-    assert pickle.loads(pickle.dumps(law.typical())) == law.typical()
 
 
 PANEL = panel().points()

@@ -99,7 +99,7 @@ class Cell(NodesOfACell):
             self.stamp_ns += STEP_NS
 
     @rule(odd=st.sampled_from([
-        {'sec': -1}, {'sec': 0}, {'flow': -1.0}, {'flow': np.inf}, {'brush': -7},
+        {'sec': -1}, {'sec': 0}, {'flow': -1.0}, {'flow': 1e300}, {'brush': -7},
         {'flow': np.nan, 'brush': 1}, {'voltage_kv': np.nan, 'flow': 0.5, 'brush': 2},
         {'flow': 0.5, 'brush': 9},
     ]))  # fmt: skip

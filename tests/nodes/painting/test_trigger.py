@@ -56,6 +56,21 @@ def test_a_latched_trigger_counts(simulator, robot, ros_context, spin, wait_unti
         wait_until(lambda flow=flow: node.film.guns[0].flow == flow, what='the next state')
 
 
+def test_a_state_counts_behind_all_poses_sent_before_it(simulated, painted):
+    """In one burst, in which the clock is set back by half a second at pose 300."""
+    node, source = simulated()
+    back = 500_000_000 * (np.arange(len(UNTRIGGERED)) >= 300)
+    rows, flow = np.array([0, 320, 400]), np.array([1.0, 0.0, 1.0])
+    stepped = replace(UNTRIGGERED, stamps_ns=UNTRIGGERED.stamps_ns - back)
+    for row in range(len(stepped)):
+        if row in rows:
+            source.send_state(stepped.stamps_ns[row], float(flow[rows == row][0]))
+        source.send(stepped, slice(row, row + 1))
+    motion = replace(stepped, trigger_stamps_ns=stepped.stamps_ns[rows], trigger_flow=flow)
+    motion = replace(motion, trigger_rows=rows)
+    assert np.array_equal(painted(node), offline_um(node, motion))
+
+
 def test_what_leaves_the_part_bare_is_reported(simulated, onlooker, wait_until):
     """A gun by another clock, and one that sprays beside the part."""
     (node, source), viewer = simulated(), onlooker()

@@ -74,13 +74,14 @@ class PathBuilder:
 
         Before the first change the gun is off; without any it always sprays. Of two at one time
         the later to come counts. A change that comes after the path beyond it was handed out is
-        counted and takes effect from there on. One from before the newest pose by more than a gap
-        waits as long, and the path with it: it is a late one if the stream goes on, and one of
-        the restarted stream if that comes.
+        counted and takes effect from there on. One from before the newest pose by more than a gap,
+        or after poses that wait behind that, waits as long, and the path with it: it is a late one
+        if the stream goes on, and one of the restarted stream if that comes.
         """
-        newest_ns = self.screen.newest_ns
+        newest_ns, behind = self.screen.newest_ns, self.screen.behind.stamps_ns
         newest_ns = int(stamp_ns) if newest_ns is None else newest_ns
         waits = newest_ns - int(stamp_ns) > self.max_gap_ns
+        waits |= bool(len(behind)) and behind[0] <= int(stamp_ns) < newest_ns
         if waits:
             self._restart_until_ns = newest_ns + self.max_gap_ns
         elif self._integrated_ns is not None:

@@ -161,16 +161,16 @@ class PoseScreen:
     """Drops and counts poses with a repeated or backward stamp, a non-finite number or a
     quaternion that is no rotation, and a driver's repeats; notices gaps and restarted streams.
 
-    Poses with stamps before the newest one wait. A few of them are stragglers and are dropped
-    when the stream continues; a run of them that is longer than a gap is the stream restarted,
-    and none of it is lost. A time longer than ``max_gap_ns`` between two poses is a gap.
+    Poses with stamps before the newest one wait ``behind``. A few of them are stragglers and are
+    dropped when the stream continues; a run of them that is longer than a gap is the stream
+    restarted, and none of it is lost. More than ``max_gap_ns`` between two poses is a gap.
     """
 
     def __init__(self, max_gap_ns: int) -> None:
         self.max_gap_ns = max_gap_ns
         self.counts = PoseCounts()
         self.newest_ns: int | None = None
-        self._behind = NO_POSES
+        self.behind = NO_POSES
         self._repeats = RepeatedSamples()
 
     def take(self, poses: PoseBatch) -> list[PoseBatch]:
@@ -178,7 +178,7 @@ class PoseScreen:
 
         The first batch continues those before; each further one is a restarted stream.
         """
-        poses = PoseBatch.joined([self._behind, self._rotations(poses)])
+        poses = PoseBatch.joined([self.behind, self._rotations(poses)])
         streams: list[list[int]] = [[]]
         behind: list[int] = []
         stamps = poses.stamps_ns.tolist()
@@ -206,13 +206,13 @@ class PoseScreen:
                         self._step_to(stamps[waited])
                     streams.append(behind)
                     behind = []
-        self._behind = poses.select(behind)
+        self.behind = poses.select(behind)
         return [poses.select(rows) for rows in streams]
 
     def finish(self) -> None:
         """The stream has ended: what still waits is dropped."""
-        self.counts.backward_stamps += len(self._behind)
-        self._behind = NO_POSES
+        self.counts.backward_stamps += len(self.behind)
+        self.behind = NO_POSES
 
     def _rotations(self, poses: PoseBatch) -> PoseBatch:
         quaternions = poses.quaternions_xyzw

@@ -13,6 +13,8 @@ ONLY_BRUSH = 0
 # Earlier than any stamp [ns].
 BEFORE_ALL_NS = -(2**62)
 
+# A flow that is so many times the calibrated one is in another unit.
+MOST_FLOW = 100.0
 SPRAYS_NOTHING = (
     'says spraying with flow 0, which lays no paint: give 1 for the calibrated flow, or NaN where '
     'it is not measured'
@@ -22,14 +24,14 @@ SPRAYS_NOTHING = (
 def relative_flow(spraying: bool, flow: float = math.nan) -> float:
     """Flow relative to the calibrated one, 0 while the gun is off; NaN is unknown and taken as 1.
 
-    Raises RecordingError for a flow that is negative or infinite.
+    Raises RecordingError for a flow that is negative, or more than any gun has.
     """
     if not spraying:
         return 0.0
     if math.isnan(flow):
         return 1.0
-    if flow < 0.0 or math.isinf(flow):
-        raise RecordingError(f'atomizer flow is {flow}: give 1 for the calibrated flow, or NaN')
+    if not 0.0 <= flow <= MOST_FLOW:
+        raise RecordingError(f'atomizer flow is {flow:g}: give 1 for the calibrated flow, or NaN')
     return float(flow)
 
 

@@ -263,7 +263,7 @@ class PaintNode(Node):
             for file in self._files_of(new):
                 self.require_named_folder(file)
             self._validate(self.values | new, set(new) if self.configured else set())
-        except (PaintError, OSError, MemoryError) as error:
+        except Exception as error:  # no file that a peer names ends a node
             reason = str(error) or 'not enough memory'
             return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)

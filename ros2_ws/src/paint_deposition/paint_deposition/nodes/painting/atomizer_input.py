@@ -156,6 +156,7 @@ class AtomizerInput:
             self._place()
         else:
             self.state_sent_ns = max(self.state_sent_ns, sent_ns)
+            self.flush()  # poses that were sent before it: their stamps may have gone back
             try:
                 change = trigger_change(message)
                 self._node.film.guns[self._number].add_trigger(change)

@@ -1,6 +1,7 @@
 """Node `deposition_simulator`: the film on a part as the atomizer paints it."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -130,9 +131,7 @@ class DepositionSimulator(PaintingNode):
         values, names, files = dict(self.values), self.gun_names, self.files_in_use
         counts = [gun.counts.to_dict() for gun in self.film.guns]
         effects = (effect.id for gun in self.film.guns for effect in gun.model.effects)
-        refused: dict[str, int] = {}
-        for source in self.inputs:
-            refused |= source.refused_frames
+        refused = sum((source.refused_frames for source in self.inputs), Counter[str]())
         details: dict[str, Any] = {
             'mesh_file': self.mesh_file,
             'mesh_id': surface.mesh_id,
