@@ -115,7 +115,6 @@ class Cell(NodesOfACell):
     @rule(step_s=st.sampled_from([-3600.0, -2.0, -0.4, 0.1, 2.0, 3600.0]))
     def set_clock(self, step_s: float) -> None:
         """Of the robot, with the gun as it is or told anew."""
-        self.settle()
         self.stamp_ns += round(step_s * 1e9)
         self.gun_ns = self.stamp_ns
 
