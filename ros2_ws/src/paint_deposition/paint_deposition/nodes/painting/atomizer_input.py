@@ -82,8 +82,9 @@ class AtomizerInput:
         # What was taken from the queues, and when it was sent.
         self._new_poses: list[tuple[PoseStamped, int]] = []
         self._new_states: list[tuple[AtomizerState, int]] = []
-        # The next batch.
+        # The next batch, and whether a stamp of it is before one of the part (the highest).
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
+        self._goes_back, self._highest_ns = False, 0
         self._held: list[tuple[PoseStamped | AtomizerState, int]] | None = None
         self._hold_after_ns = 0
         self.tf_queue: TfQueue = deque()
@@ -124,7 +125,7 @@ class AtomizerInput:
         self.refusal = ''
         self.anomalies: Counter[str] = Counter()
         self.state_errors: set[str] = set()
-        self.unpainted = 0
+        self.unpainted = self._highest_ns = 0
         for topic in self.topics:
             topic.lost = 0
         self.steps = StreamSteps()
@@ -156,7 +157,8 @@ class AtomizerInput:
             self._place()
         else:
             self.state_sent_ns = max(self.state_sent_ns, sent_ns)
-            self.flush()  # poses that were sent before it: their stamps may have gone back
+            if self._goes_back:  # it must not overtake the poses sent before it
+                self.flush()
             try:
                 change = trigger_change(message)
                 self._node.film.guns[self._number].add_trigger(change)
@@ -220,7 +222,7 @@ class AtomizerInput:
             return
         stamps, positions, quaternions = map(np.array, zip(*self._poses, strict=True))
         self._poses.clear()
-        self.newest_ns = int(stamps[-1])
+        self.newest_ns, self._goes_back = int(stamps[-1]), False
         batch = PoseBatch(stamps, positions, quaternions)
         moved = batch.select(np.flatnonzero(batch.finite))
         jumped = self.steps.jumps
@@ -258,7 +260,10 @@ class AtomizerInput:
             frame_id = pose.header.frame_id
             if not isinstance(placed, NoTransform):
                 self.anomalies['poses without a frame'] += not frame_id
-                self._poses.append((stamp_ns(pose.header), *placed))
+                stamp = stamp_ns(pose.header)
+                self._goes_back |= stamp <= self._highest_ns
+                self._highest_ns = max(self._highest_ns, stamp)
+                self._poses.append((stamp, *placed))
                 continue
             if frame_id not in self.refused_frames and len(self.refused_frames) >= MOST_NAMES:
                 frame_id = 'others'
