@@ -152,8 +152,13 @@ def test_two_effects_are_found_each_with_a_step_that_improves_the_prediction():
     """On two panels, painted in opposite orders."""
     acting = EFFECTS['fog_gradient'](fog_um=6.0), EFFECTS['flow_drift'](drift_per_pass=0.1)
     truth = pd.DepositionModel(effects=acting)
-    found = diagnose(gauged(truth, seed=0, orders=ORDERS), BASE, LIBRARY)
+    campaign = gauged(truth, seed=0, orders=ORDERS)
+    one = diagnose(campaign, BASE, {'flow_drift': LIBRARY['flow_drift']})
+    assert one.accepted == ('flow_drift',)
+    assert one.reason.endswith(f' They show more than that (p = 0.0011). {one.unknown}')
+    found = diagnose(campaign, BASE, LIBRARY)
     assert found.verdict == 'effect_missing'
+    assert found.unknown is None
     # A footprint that the readings learned beside them is no effect.
     named = set(found.accepted) - {'learned:footprint'}
     assert named == {'fog_gradient', 'flow_drift'}
