@@ -38,6 +38,8 @@ FOLDS = 6
 TEXTURE_SHARE = 0.01
 # Parts and gauge sessions that differ so improbably are no usual ones.
 UNUSUAL = 0.02
+# Error at the fitted points over gauge and texture beyond which more is missing than levels.
+MOST_OFF = 1.25
 
 # Data that are simply wrong, see ``mistaken_data``: a sentence with the remedy, and whether
 # nothing can be concluded from them.
@@ -226,19 +228,20 @@ class Study:
         effects = self.random_effects
         if not effects:
             return 1.0, ''
+        # Where more is off than gauge and texture, what is missing may look like levels.
+        off = self.residuals(fit.predicted_um).rmse_um / self.noise_floor_um
+        is_off = off > MOST_OFF
         # Amplitudes of unit variance, and the share of it that the readings tell.
-        mean, covariance = fit.amplitudes
+        mean, covariance = (fit if is_off else replace(fit, discrepancy=None)).amplitudes
         shares, ways = np.linalg.eigh(np.eye(len(mean)) - covariance)
         seen = shares > 0.5
         square = float(np.sum((ways[:, seen].T @ mean) ** 2 / shares[seen]))
-        if fit.discrepancy is None:  # what else is missing may look like levels
-            rmse_um = self.residuals(fit.predicted_um).rmse_um
-            square /= max(rmse_um / self.noise_floor_um, 1.0) ** 2
+        square /= off**2 if is_off and fit.discrepancy is None else 1.0
         p_value = float(chi2.sf(square, np.count_nonzero(seen)))
         if p_value > UNUSUAL:
             return p_value, ''
         levels = []
-        estimated = amounts(mean, covariance, effects)
+        estimated = amounts(*fit.amplitudes, effects)
         for kind, of_kind in groupby(estimated, key=attrgetter('kind')):
             found = [*of_kind]
             told = ', '.join(f'{one.of} {one.value:+.1f} {one.unit}' for one in found)
