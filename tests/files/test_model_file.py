@@ -173,7 +173,8 @@ def test_what_is_left_out_has_its_default(file):
         ('history: [{}, 3]', 'history.1 is 3; expected a list of mappings'),
         ('', 'model is None; expected the keys name, planar'),
         ('planar: {K2: .1, K2: .2}', 'cannot be read as YAML (line 1: found duplicate key "K2"'),
-        ('planar: {K2: 2024-13-45}', 'put such a value in quotes'),
+        *((f'planar: {{K2: {value}}}', 'put such a value in quotes, without tags')
+          for value in ('2024-13-45', '!!bool foo', '!!int ""', r'"\ud800"', f'0x{6000 * "f"}')),
         ('planar:\n  K2: [', 'cannot be read as YAML (line 2: '),
         ('brushes: {}', ': brushes is empty; give a brush by its number, or planar'),
         ('brushes: {0: {planar: {}}}', ': brushes: 0 is not a brush number; give 1, 2 and so on'),
