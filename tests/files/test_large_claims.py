@@ -1,5 +1,6 @@
 """A head that claims more than its file holds is refused before memory is taken for it."""
 
+import json
 import os
 import resource
 import shutil
@@ -50,6 +51,15 @@ def _mcap_chunk(claimed: int, data: bytes) -> bytes:
     data_end = b'\x0f' + struct.pack('<QI', 4, 0)
     footer = b'\x02' + struct.pack('<QQQI', 20, 0, 0, 0)
     return plain[:head] + chunk + data_end + footer + plain[:8]
+
+
+def _glb(count: int, nodes: list) -> bytes:
+    """Zeros at these nodes."""
+    head = {'nodes': nodes, 'scenes': [{'nodes': [0]}], 'scene': 0}
+    head |= {'bufferViews': [], 'meshes': [{'primitives': [{'attributes': {'POSITION': 0}}]}]}
+    head['accessors'] = [{'componentType': 5126, 'count': count, 'type': 'VEC3'}]
+    content = json.dumps(head).encode()
+    return struct.pack('<4s4I', b'glTF', 2, 20 + len(content), len(content), J) + content
 
 
 def _doubled(around: bytes, between: bytes = b', ') -> bytes:
@@ -121,6 +131,10 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'faces of a text PLY': ('ply', lambda: _ply('ascii', 3, CLAIMED)),
     'triangles of an STL': ('stl', lambda: bytes(80) + struct.pack('<I', CLAIMED) + bytes(50)),
     'a chunk of a glTF': ('glb', lambda: struct.pack('<4s4I', b'glTF', 2, 20, 4 * CLAIMED, J)),
+    'zeros of a glTF': ('glb', lambda: _glb(CLAIMED, [{'mesh': 0}])),
+    'nodes within each other': (
+        'glb', lambda: _glb(3, [{'children': [1]}, {'mesh': 0, 'children': [0]}]),
+    ),
     'a zstd chunk to recover': (
         'mcap_recovery', lambda: _mcap_chunk(2**40, b'\x28\xb5\x2f\xfd' + bytes(20)),
     ),

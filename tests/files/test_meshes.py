@@ -1,6 +1,7 @@
 """Meshes: what is read, put right and refused; their units, and several bodies in one file."""
 
 import importlib.util
+import os
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,11 @@ def broken(path, kind):
         path.write_bytes(bytes(range(256)) * 9 * (kind == 'garbage'))
     elif kind == 'truncated':
         path.write_bytes(saved(icosphere(), path).read_bytes()[:32042])
+    elif kind == 'bodies':
+        path.write_text('\no '.join(['v 0 0 0', *(f'{k}\nf 1 1 1' for k in range(21_000))]))
+    elif kind == 'a pipe':
+        os.mkfifo(path.with_name('pipe'))
+        path.write_text('{"buffers": [{"uri": "pipe"}]}')
     elif kind == 'points only':
         trimesh.PointCloud(corners).export(path)
     else:
@@ -110,6 +116,7 @@ def broken(path, kind):
         ('part.ply', 'not finite', 'not finite'),
         ('part.stl', 'no area', 'none of its 2 triangles has an area'),
         ('part.ply', 'points only', 'no triangles'),
+        ('part.obj', 'bodies', 'has 21000 bodies, over 20000; join them, or export fewer'),
     ],
 )
 def test_broken_files_are_refused_in_one_line(tmp_path, name, kind, says):
@@ -117,6 +124,12 @@ def test_broken_files_are_refused_in_one_line(tmp_path, name, kind, says):
     line = refusal(MeshError, read_mesh, path)
     assert says in line
     assert line.startswith(str(path))
+
+
+def test_a_pipe_as_a_buffer_is_not_read(tmp_path):
+    assert 'pipe is a device or a pipe' in refusal(
+        MeshError, read_mesh, broken(tmp_path / 'part.gltf', 'a pipe')
+    )
 
 
 def test_absurd_sizes_are_refused_with_the_remedy(tmp_path):

@@ -130,8 +130,8 @@ def results_options(what: str, default: str | None = None) -> Decorator:
         'all results are complete.'
     )
     each = {
-        'output': click.option('-o', '--output', type=FOLDER, required=default is None,
-                               default=default, help=text),
+        'output': click.option('-o', '--output', type=FOLDER, help=text,
+                               **({'default': default} if default else {'required': True})),
         'pictures': click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']),
                                  default='png', show_default=True, help='Format of the pictures.'),
         'as_json': JSON,

@@ -29,18 +29,19 @@ MOST_EXPANDED_BYTES, BLOCK_BYTES = 1_000_000_000, 1 << 20
 MOST_LEVELS, MOST_REPEATED = 500, 500_000
 
 
-def require_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> None:
-    """Raise ``refusal`` for what is there and is no regular file or folder, or is too large.
+def require_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> Path:
+    """The path; raise ``refusal`` for what is there and is no regular file, or is too large.
 
     A device or a pipe would be read for ever.
     """
     path = Path(path)
     if not path.exists() or path.is_dir():
-        return  # whoever reads it says so
+        return path  # whoever reads it says so
     if not path.is_file():
         raise refusal(f'{path} is a device or a pipe; give a file')
     if (size_mb := path.stat().st_size / 1e6) > most_mb:
         raise refusal(f'{path} has {size_mb:.0f} MB; give a file of {most_mb:g} MB at most')
+    return path
 
 
 def require_small_package(package: zipfile.ZipFile) -> None:
@@ -62,8 +63,7 @@ def require_small_package(package: zipfile.ZipFile) -> None:
 
 def read_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> bytes:
     """The content of a file that ``require_file`` takes. Raises OSError as Path.read_bytes."""
-    require_file(path, refusal, most_mb)
-    return Path(path).read_bytes()
+    return require_file(path, refusal, most_mb).read_bytes()
 
 
 def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
