@@ -6,7 +6,7 @@ import resource
 import shutil
 import struct
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -89,15 +89,15 @@ def _mcap_with(field: bytes) -> bytes:
     return made.getvalue()
 
 
-def _blanks() -> bytes:
+def _book(sheet: Iterable[bytes], texts: bytes = b'<sst/>') -> bytes:
+    """A workbook with this sheet, given in pieces, and these shared texts."""
     made, old = BytesIO(), zipfile.ZipFile(BytesIO(targets()['workbook'].seeds[0]))
     with zipfile.ZipFile(made, 'w', zipfile.ZIP_DEFLATED) as new:
-        for name in old.namelist():
-            with new.open(name, 'w', force_zip64=True) as member:
-                member.write(old.read(name))
-                if name.endswith('sheet1.xml'):
-                    for _ in range(1500):
-                        member.write(b' ' * 1_000_000)
+        for name in set(old.namelist()) - {'xl/sheet1.xml'}:
+            new.writestr(name, old.read(name))
+        new.writestr('xl/sharedStrings.xml', texts)
+        with new.open('xl/sheet1.xml', 'w', force_zip64=True) as member:
+            member.writelines(sheet)
     return made.getvalue()
 
 
@@ -146,7 +146,17 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'an alias within itself': ('model', lambda: b'effects: &a [*a]'),
     'a zstd chunk': ('mcap', _bomb_chunk),
     'strings of a schema': ('mcap', lambda: _mcap_with(b'string[2000000000] a\n')),
-    'blanks of a workbook': ('workbook', _blanks),
+    'blanks of a workbook': ('workbook', lambda: _book([_row(b'<row><c'), *400 * [10**6 * b' ']])),
+    'a text in many cells': (
+        'workbook', lambda: _book(
+            [_row(b'<row>' + 1000 * b'<c t="s"><v>0</v></c>' + b'<c')],
+            b'<sst><si><t>%s</t></si></sst>' % (10**6 * b'a'),
+        ),
+    ),
+    'a far place with blanks': ('worksheet', lambda: _row(b'<row r="1048576"><c r = "XFD1"')),
+    'cells without a place': (
+        'worksheet', lambda: _row(10**6 * b'<row/>' + b'<row>' + 10**4 * b'<c/>' + b'<c'),
+    ),
     'a far row of a workbook': ('worksheet', lambda: _row(b'<row r="1048576"><c r="XFD1"')),
     'a cell no sheet has': ('worksheet', lambda: _row(b'<row r="1"><c r="AAAAA999999991"')),
     **{f'{name} of RAPID': ('rapid', partial(_main, body)) for name, body in RAPID_BODIES.items()},

@@ -6,8 +6,6 @@ Texts, YAML, JSON that every reader takes (no NaN), Parquet tables, and texts by
 from __future__ import annotations
 
 import os
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
 # Of a file that is read as a whole [MB]: more is no mesh or table of this trade, or would fill the
 # memory. Of a text that a person edits, and of YAML, which takes 10 s and 70 MB for each MB.
 MOST_MB, MOST_TEXT_MB, MOST_YAML_MB = 2000, 20, 2
-MOST_EXPANDED_BYTES, BLOCK_BYTES = 1_000_000_000, 1 << 20
+BLOCK_BYTES = 1 << 20
 # Levels of a YAML document, and letters and values that its aliases stand for.
 MOST_LEVELS, MOST_REPEATED = 500, 500_000
 
@@ -42,23 +40,6 @@ def require_file(path: str | Path, refusal: type[PaintError], most_mb: float = M
     if (size_mb := path.stat().st_size / 1e6) > most_mb:
         raise refusal(f'{path} has {size_mb:.0f} MB; give a file of {most_mb:g} MB at most')
     return path
-
-
-def require_small_package(package: zipfile.ZipFile) -> None:
-    """Raise BadZipFile for one that is too large when it is expanded, or says it is smaller."""
-    left = MOST_EXPANDED_BYTES
-    for member in package.infolist():
-        left -= member.file_size
-        if left < 0:
-            raise zipfile.BadZipFile(f'it holds over {MOST_EXPANDED_BYTES / 1e6:g} MB, expanded')
-        try:
-            with package.open(member) as content:  # the end is compared with what the head says
-                while content.read(BLOCK_BYTES):
-                    pass
-        except (EOFError, NotImplementedError, RuntimeError, ValueError, zlib.error) as error:
-            raise zipfile.BadZipFile(
-                f'{member.filename}: {str(error) or "it breaks off"}'
-            ) from None
 
 
 def read_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> bytes:
