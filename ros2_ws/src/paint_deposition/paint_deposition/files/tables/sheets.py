@@ -1,15 +1,17 @@
 """Sheets of cells, from text files of any usual encoding and separator and from workbooks."""
 
 import csv
-import json
 import re
 import zipfile
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from io import BytesIO, StringIO
+from itertools import chain
 from pathlib import Path
 from xml.parsers import expat
+
+from pydantic_core import from_json
 
 from paint_deposition.errors import LONGEST_REASON, PaintError, shortened, some
 from paint_deposition.files.atomic import read_file
@@ -19,9 +21,12 @@ from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES, NOTHING
 Cell = str | float
 
 WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
-MOST_TABLE_MB = 500
-# Of a workbook: its package when it is expanded, cells, and letters of texts in them.
-MOST_EXPANDED_BYTES, MOST_CELLS, MOST_LETTERS = 300_000_000, 10_000_000, 300_000_000
+MOST_TABLE_MB = 150
+# Of a table; a million rows take 1.2 GB and 40 s.
+MOST_ROWS, MOST_COLUMNS, MOST_CELLS = 1_200_000, 16_384, 10_000_000
+LINE_BREAK = re.compile(r'\r\n|[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]')
+# Of a workbook: its package when it is expanded, and the letters of all its cells.
+MOST_EXPANDED_BYTES, MOST_LETTERS = 300_000_000, 300_000_000
 FAR = 'a workbook (delete what lies far outside the table)'
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
@@ -42,9 +47,18 @@ class Sheet:
 
     @staticmethod
     def of(numbered: Iterable[tuple[int, list[Cell]]], form: str) -> 'Sheet':
-        """The rows that are not blank."""
-        kept = [(line, row) for line, row in numbered if any(cell != '' for cell in row)]
-        return Sheet([row for _, row in kept], [line for line, _ in kept], form)
+        """The rows that are not blank. Raises ValueError for too many cells."""
+        sheet, cells = Sheet([], [], form), 0
+        for line, row in numbered:
+            cells += len(row)
+            if cells > MOST_CELLS or len(row) > MOST_COLUMNS:
+                raise ValueError(
+                    f'a table ({form}: over {MOST_COLUMNS} columns, or too many cells)'
+                )
+            if any(cell != '' for cell in row):
+                sheet.rows.append(row)
+                sheet.lines.append(line)
+        return sheet
 
 
 def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
@@ -75,7 +89,7 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
         if records := _records(texts[0][0]):
             return [records]
         return [sheet for text, encoding in texts for sheet in _sheets_of_text(text, encoding)]
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:  # a number of hundreds of digits
         reason = shortened(str(error), LONGEST_REASON)
         raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
 
@@ -108,8 +122,8 @@ def _decoded(content: bytes) -> list[tuple[str, str]]:
 def _records(text: str) -> Sheet | None:
     """The first list of records in JSON as a table, what stands beside it above; else None."""
     try:
-        found = json.loads(text, parse_int=float) if text.lstrip()[:1] in ('[', '{') else None
-    except (ValueError, RecursionError):
+        found = from_json(text) if text.lstrip()[:1] in ('[', '{') else None
+    except ValueError:
         return None
     above: list[list[Cell]] = []
     while isinstance(found, dict):
@@ -119,11 +133,13 @@ def _records(text: str) -> Sheet | None:
     if not records:
         return None
     keys = list(dict.fromkeys(key for record in records for key in record))
-    rows = [[_cell(record.get(key)) for key in keys] for record in records]
-    return Sheet.of(enumerate([*above, [*map(_cell, keys)], *rows], 1), 'JSON')
+    rows = ([_cell(record.get(key)) for key in keys] for record in records)
+    return Sheet.of(enumerate(chain(above, [[*map(_cell, keys)]], rows), 1), 'JSON')
 
 
 def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
+    if sum(1 for _ in LINE_BREAK.finditer(text)) > MOST_ROWS:
+        raise ValueError(f'a table (over {MOST_ROWS} lines; split it)')
     sheets = []
     separators = {'\t': 'tabs', ';': 'semicolons', '|': 'bars', ',': 'commas'}
     for mark, name in separators.items():
