@@ -34,7 +34,7 @@ class BatchError(PaintError):
 def some(names: Sequence[str], most: int) -> str:
     """'a, b and 3 more': so many of the names at most, for a message."""
     more = f' and {len(names) - most} more' if len(names) > most else ''
-    return ', '.join(names[:most]) + more
+    return ', '.join(map(shortened, names[:most])) + more
 
 
 def quoted(value: object) -> str:
@@ -63,4 +63,4 @@ def did_you_mean(name: object, known: Iterable[str], otherwise: str = '') -> str
     near = near or difflib.get_close_matches(str(name), known, n=1, cutoff=0.4)
     if near:
         return f'did you mean {near[0]!r}?'
-    return otherwise or f'there are: {", ".join(known) or "none"}'
+    return otherwise or f'there are: {some(known, 40) or "none"}'
