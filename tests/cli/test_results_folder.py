@@ -47,7 +47,7 @@ def test_files_and_folders_of_the_users_own_are_not_replaced(tmp_path, name):
     mine = tmp_path / name
     mine.parent.mkdir(exist_ok=True)
     mine.write_text('mine')
-    with pytest.raises(PaintError, match='was not written by paint.*; move it'):
+    with pytest.raises(PaintError, match=r'was not written by paint.*; move it'):
         write(tmp_path, 'trajectory/bag.mcap', 'model.yaml', 'plan.json')
     assert [path for path in tmp_path.rglob('*') if path.is_file()] == [mine]
     assert mine.read_text() == 'mine'
