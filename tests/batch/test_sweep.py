@@ -219,6 +219,14 @@ def test_draws_repeat_with_their_seed_and_have_the_spread_asked_for():
         ({'grid': {'part_pose': [[0, 0, 0]]}}, 'seven numbers'),
         ({'grid': {'index_m': [0.1]}, 'cases': [{'index_m': 0.2}]}, 'index_m varies twice'),
         ({'sample': {'count': 10}, 'grid': {'index_m': [0.1] * 200_000}}, '2000000 cases'),
+        (
+            {
+                'grid': dict.fromkeys(
+                    ['index_m', 'standoff_m', 'flow_factor', 'speed_factor'], [0.1] * 2**16
+                )
+            },
+            '18446744073709551616 cases',
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused(told, words):
@@ -231,6 +239,7 @@ def test_what_makes_no_sense_is_refused(told, words):
     [
         ('mesh: a.stl', 'nothing varies; give one of grid, cases, sample'),
         ('gird: {index_m: [0.1]}', "unknown key 'gird'; did you mean 'grid'"),
+        (f'grid: {{index_m: {300 * "a"}}}', f"index_m is '{56 * 'a'}...; expected a list"),
         ('grid: {index_m: 0.1}', 'index_m is 0.1; expected a list of at least one value'),
         ('grid: {index_m: {first: 1}}', 'first: A, last: B, steps: N'),
         ('sample: {vary: {}}', "has no 'sample.count'; give how many draws"),

@@ -96,6 +96,7 @@ def jobs(tmp_path_factory):
     ('recover nowhere', 'nowhere'), ('inspect nowhere', 'nowhere'),
     ('inspect', 'RECORDING'), (f'compare {CAMPAIGN}', "Missing option '-o'"),
     ('inspect door_horizontal --out a.png', '--mesh'),
+    ('inspect door_horizontal --mesh door.stl -o notes.py', 'not drawn by paint; choose another'),
     ('inspect door.stl --tf a b', '--tf: not for a mesh; leave it'),
     ('inspect door.stl --max-edge-length-m 0.1', '--max-edge-length-m: not for a mesh; leave it'),
     ('inspect readings.csv --strict', '--strict: not for gauge readings; leave it'),

@@ -105,6 +105,7 @@ RAPID_BODIES = {
     'arrays': b'VAR num x{1000,1000,1000}; x{1,1,1}:=1;',
     'copies': b'VAR num x{100000}; VAR num y{100000}; FOR i FROM 1 TO 9999 DO y:=x; ENDFOR',
     'strings': b'VAR string s:="a"; FOR i FROM 1 TO 9999 DO s:=s+s; ENDFOR',
+    'sums': b'VAR num x{100000}; VAR num n; FOR i FROM 1 TO 9999 DO n:=Dim(x+x,1); ENDFOR',
     'empty loops': b'FOR i FROM 1 TO 9998 DO FOR j FROM 1 TO 9998 DO ENDFOR ENDFOR',
 }
 
