@@ -11,6 +11,7 @@ import refusals
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.rapid import program as rapid
 from paint_deposition.files.rapid.program import module_text, read_program
+from paint_deposition.motion import programmed
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import GunSwitch, Move
 
@@ -334,11 +335,17 @@ def test_a_move_takes_the_time_that_it_is_given(motion, move):
     ('end', 'speed', 'words'),
     [
         ('', '', 'a single move'),
+        (
+            down(1),
+            f'v100,fine,tool0;MoveL {down(0)},v100,fine,tool0;MoveL {down(1)},v100',
+            'line 5: the program runs for over 0.0025 h',
+        ),
         (down(1), '[0,500,0,0]', 'speed 0 m/s'),
         (down('1e12'), 'v100', r'line 5: a move of 1e\+09 m at 0.1 m/s takes .* h'),
     ],
 )
-def test_what_is_no_motion_is_refused(motion, end, speed, words):
+def test_what_is_no_motion_is_refused(motion, end, speed, words, monkeypatch):
+    monkeypatch.setattr(programmed, 'LONGEST_S', 9.0)
     second = f'MoveL {end},{speed},fine,tool0;' if end else ''
     with pytest.raises(RecordingError, match=words):
         motion(f'MoveL {down(0)},v500,fine,tool0;\n{second}')

@@ -348,6 +348,8 @@ def _read_errors(path: Path) -> Iterator[None]:
         raise RecordingError(f'cannot read {path}: {error.strerror or error}') from None
     except Exception as error:
         reason = shortened(str(error), LONGEST_REASON).rstrip('.') or type(error).__name__
+        if isinstance(error, MemoryError):
+            reason = 'a record claims more than there is memory'
         raise RecordingError(f'{path} is damaged ({reason}){_remedy(path)}') from None
 
 

@@ -28,8 +28,12 @@ LINE_BREAK = re.compile(r'\r\n|[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]')
 # Of a workbook: its package when it is expanded, and the letters of all its cells.
 MOST_EXPANDED_BYTES, MOST_LETTERS = 300_000_000, 300_000_000
 FAR = 'a workbook (delete what lies far outside the table)'
-# What a spreadsheet would take for a formula, and no number: written with a ' before it.
-FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
+# Before what a spreadsheet would take for a formula, and no number, a ' is written: where a cell
+# begins, also where a semicolon may part two.
+FORMULA_BEGINS = r'(?=[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?(;|$)))'
+FORMULA, DISARMED = (
+    re.compile(rf'(?<![^;]){mark}{FORMULA_BEGINS}', re.IGNORECASE) for mark in ('', "'")
+)
 EXPECTED = 'give a table as CSV, TSV, TXT or JSON, or a workbook (.xlsx, .xls)'
 
 
@@ -251,7 +255,7 @@ def _cell(value: object) -> Cell:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     text = ' '.join(str(value).strip().splitlines())
-    return text[1:].strip() if text[:1] == "'" and FORMULA.match(text[1:]) else text
+    return DISARMED.sub('', text).strip() if "'" in text else text
 
 
 def cell_at(row: list[Cell], column: int) -> Cell:
