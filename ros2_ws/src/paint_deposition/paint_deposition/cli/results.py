@@ -21,7 +21,6 @@ import paint_deposition as pd
 from paint_deposition.cli.options import FOLDER, JSON, Decorator, option_group
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.provenance import sha256
 
 if TYPE_CHECKING:
     from paint_deposition.film.statistics import FilmStatistics
@@ -210,6 +209,8 @@ def results_in(folder: Path) -> Iterator[Path]:
 
 def _replace(folder: Path, work: Path) -> None:
     """Put the former results aside and the new in, each file by a rename."""
+    from paint_deposition.files.provenance import sha256
+
     former, new = work / 'former', work / 'new'
     fresh = {name: sha256(new / name) for name in _files_below(new)}
     places = ((folder / name, name, digest) for name, digest in _written(folder).items())
