@@ -28,13 +28,10 @@ def saved(mesh: trimesh.Trimesh, path, **options):
     return path
 
 
-@pytest.mark.parametrize(
-    ('name', 'options'),
-    [
-        ('part.stl', {'file_type': 'stl_ascii'}), ('PART.STL', {'file_type': 'stl'}),
-        ('part.ply', {'encoding': 'ascii'}), ('part.obj', {}),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(('name', 'options'), [
+    ('part.stl', {'file_type': 'stl_ascii'}), ('PART.STL', {'file_type': 'stl'}),
+    ('part.ply', {'encoding': 'ascii'}), ('part.obj', {}),
+])  # fmt: skip
 def test_formats_give_the_same_part(tmp_path, name, options):
     ball = icosphere(subdivisions=3, radius=0.2)
     surface = read_mesh(saved(ball, tmp_path / name, **options))
@@ -105,20 +102,17 @@ def broken(path, kind):
     return path
 
 
-@pytest.mark.parametrize(
-    ('name', 'kind', 'says'),
-    [
-        ('part.stl', 'garbage', 'neither a text STL nor'),
-        ('part.ply', 'garbage', 'not readable as a mesh'),
-        ('part.glb', 'garbage', 'not readable as a mesh'),
-        ('part.stl', 'empty file', 'no triangles'),
-        ('part.stl', 'truncated', '32042 bytes, a complete binary one'),
-        ('part.ply', 'not finite', 'not finite'),
-        ('part.stl', 'no area', 'none of its 2 triangles has an area'),
-        ('part.ply', 'points only', 'no triangles'),
-        ('part.obj', 'bodies', 'has 21000 bodies, over 20000; join them, or export fewer'),
-    ],
-)
+@pytest.mark.parametrize(('name', 'kind', 'says'), [
+    ('part.stl', 'garbage', 'neither a text STL nor'),
+    ('part.ply', 'garbage', 'not readable as a mesh'),
+    ('part.glb', 'garbage', 'not readable as a mesh'),
+    ('part.stl', 'empty file', 'no triangles'),
+    ('part.stl', 'truncated', '32042 bytes, a complete binary one'),
+    ('part.ply', 'not finite', 'not finite'),
+    ('part.stl', 'no area', 'none of its 2 triangles has an area'),
+    ('part.ply', 'points only', 'no triangles'),
+    ('part.obj', 'bodies', 'has 21000 bodies, over 20000; join them, or export fewer'),
+])  # fmt: skip
 def test_broken_files_are_refused_in_one_line(tmp_path, name, kind, says):
     path = broken(tmp_path / name, kind)
     line = refusal(MeshError, read_mesh, path)

@@ -80,15 +80,12 @@ def test_the_last_columns_of_a_measuring_machine_are_the_normal():
     assert readings.thickness_um.tolist() == [21.5, 22.5]
 
 
-@pytest.mark.parametrize(
-    ('headings', 'layout', 'layers', 'films'),
-    [
-        ('Spot;E-coat;Base coat;Clearcoat;Total', {}, 'e-coat base clear total', '20 15 40 75'),
-        ('Punkt;Schicht 1;Schicht 2;Schicht 3;Gesamt', {}, 'layer1 layer2 layer3 total',
-         '20 15 40 75'),
-        ('Point;a;b;c;d', {'layers': {'mica': 'b', 'clear': 4}}, 'mica clear', '15 40'),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(('headings', 'layout', 'layers', 'films'), [
+    ('Spot;E-coat;Base coat;Clearcoat;Total', {}, 'e-coat base clear total', '20 15 40 75'),
+    ('Punkt;Schicht 1;Schicht 2;Schicht 3;Gesamt', {}, 'layer1 layer2 layer3 total',
+     '20 15 40 75'),
+    ('Point;a;b;c;d', {'layers': {'mica': 'b', 'clear': 4}}, 'mica clear', '15 40'),
+])  # fmt: skip
 def test_columns_may_be_layers(headings, layout, layers, films, file, points):
     path = file('f.csv', f'{headings}\nP1;20;15;40;75\nP2;;16;;\n')
     readings = read_readings(path, points, Layout(columns=layout))
