@@ -158,7 +158,6 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'cells without a place': (
         'worksheet', lambda: _row(10**6 * b'<row/>' + b'<row>' + 10**4 * b'<c/>' + b'<c'),
     ),
-    'a far row of a workbook': ('worksheet', lambda: _row(b'<row r="1048576"><c r="XFD1"')),
     'a cell no sheet has': ('worksheet', lambda: _row(b'<row r="1"><c r="AAAAA999999991"')),
     **{f'{name} of RAPID': ('rapid', partial(_main, body)) for name, body in RAPID_BODIES.items()},
     'calls of RAPID': ('rapid', _calls),

@@ -92,9 +92,6 @@ def broken(path, kind):
         path.write_bytes(saved(icosphere(), path).read_bytes()[:32042])
     elif kind == 'bodies':
         path.write_text('\no '.join(['v 0 0 0', *(f'{k}\nf 1 1 1' for k in range(21_000))]))
-    elif kind == 'a pipe':
-        os.mkfifo(path.with_name('pipe'))
-        path.write_text('{"buffers": [{"uri": "pipe"}]}')
     elif kind == 'points only':
         trimesh.PointCloud(corners).export(path)
     else:
@@ -121,9 +118,9 @@ def test_broken_files_are_refused_in_one_line(tmp_path, name, kind, says):
 
 
 def test_a_pipe_as_a_buffer_is_not_read(tmp_path):
-    assert 'pipe is a device or a pipe' in refusal(
-        MeshError, read_mesh, broken(tmp_path / 'part.gltf', 'a pipe')
-    )
+    os.mkfifo(tmp_path / 'pipe')
+    (tmp_path / 'part.gltf').write_text('{"buffers": [{"uri": "pipe"}]}')
+    assert 'a device or a pipe' in refusal(MeshError, read_mesh, tmp_path / 'part.gltf')
 
 
 def test_absurd_sizes_are_refused_with_the_remedy(tmp_path):

@@ -191,6 +191,9 @@ def test_what_is_wrong_is_said_in_one_line(file, text: str, message: str):
 def test_a_missing_or_unreadable_file_is_named(tmp_path: Path):
     assert 'no such file; give a model YAML' in refusal(tmp_path / 'model.yaml')
     assert 'cannot be read' in refusal(tmp_path)
+    (tmp_path / 'own.py').write_bytes(bytes(3_000_000))
+    (tmp_path / 'model.yaml').write_text('effects: [{file: own.py}]')
+    assert 'own.py has 3 MB; give a file of 2 MB' in refusal(tmp_path / 'model.yaml')
     (tmp_path / 'model.yaml').write_bytes(b'\xff\xfe\x00')
     assert 'is no text, such as a workbook or a bag' in refusal(tmp_path / 'model.yaml')
 

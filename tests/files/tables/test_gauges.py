@@ -103,19 +103,16 @@ def test_columns_of_repeats_and_a_layer_that_is_none_can_be_named(file, points):
     assert set(readings.layer.tolist()) == {''}
 
 
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        (
-            (LAYOUTS / 'byk.csv').read_text() + 'C;1;90;20\n',
-            "'No.' counts anew in each Checkzone; give a column 'point'",
-        ),
-        ('No.;DFT\n1;20\n2;21\n1;22\n2;21\n3;20\n', "'No.' counts anew; give a column 'point'"),
-        ('Reading;Thickness\n21,5;0,8\n22,5;0,8\n', "'Reading' counts the readings of a DeFelsko"),
-        # One label throughout is that of the part, but not one that nearly is a point's.
-        ('point;DFT\n' + 'P9;20\n' * 4, "the readings are called 'P9' to 'P9', and there is"),
-    ],
-)
+@pytest.mark.parametrize(('text', 'message'), [
+    (
+        (LAYOUTS / 'byk.csv').read_text() + 'C;1;90;20\n',
+        "'No.' counts anew in each Checkzone; give a column 'point'",
+    ),
+    ('No.;DFT\n1;20\n2;21\n1;22\n2;21\n3;20\n', "'No.' counts anew; give a column 'point'"),
+    ('Reading;Thickness\n21,5;0,8\n22,5;0,8\n', "'Reading' counts the readings of a DeFelsko"),
+    # One label throughout is that of the part, but not one that nearly is a point's.
+    ('point;DFT\n' + 'P9;20\n' * 4, "the readings are called 'P9' to 'P9', and there is"),
+])  # fmt: skip
 def test_a_count_or_a_wrong_label_names_no_point(text, message, file, points):
     with pytest.raises(ReadingsError, match=message):
         read_readings(file('f.csv', text), points)
