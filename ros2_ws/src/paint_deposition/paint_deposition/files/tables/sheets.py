@@ -27,6 +27,7 @@ MOST_ROWS, MOST_COLUMNS, MOST_CELLS = 1_200_000, 16_384, 10_000_000
 LINE_BREAK = re.compile(r'\r\n|[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]')
 # Of a workbook: its package when it is expanded, and the letters of all its cells.
 MOST_EXPANDED_BYTES, MOST_LETTERS = 300_000_000, 300_000_000
+DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError)
 FAR = 'a workbook (delete what lies far outside the table)'
 # Before what a spreadsheet would take for a formula, and no number, a ' is written: where a cell
 # begins, also where a semicolon may part two.
@@ -56,9 +57,7 @@ class Sheet:
         for line, row in numbered:
             cells += len(row)
             if cells > MOST_CELLS or len(row) > MOST_COLUMNS:
-                raise ValueError(
-                    f'a table ({form}: over {MOST_COLUMNS} columns, or too many cells)'
-                )
+                raise ValueError(f'a table ({form}: over {MOST_COLUMNS} columns, or too large)')
             if any(cell != '' for cell in row):
                 sheet.rows.append(row)
                 sheet.lines.append(line)
@@ -185,14 +184,7 @@ def _sheets_of_workbook(content: bytes) -> list[Sheet]:
             rows = ([_cell(value) for value in row] for row in sheet.to_python(False))
             sheets.append(Sheet.of(enumerate(rows, 1), f"sheet '{sheet.name}'"))
         return sheets
-    except (
-        CalamineError,
-        zipfile.BadZipFile,
-        zlib.error,
-        EOFError,
-        RuntimeError,
-        OSError,
-    ) as error:
+    except (CalamineError, *DAMAGE) as error:
         raise ValueError(f'a workbook ({error})') from None
 
 
@@ -230,8 +222,7 @@ def _require_small(package: zipfile.ZipFile) -> None:
         letters.clear()
         parser = expat.ParserCreate()
         parser.StartElementHandler = begin
-        is_texts = member.filename.lower() == 'xl/sharedstrings.xml'
-        if is_texts:
+        if is_texts := member.filename.lower() == 'xl/sharedstrings.xml':
             parser.CharacterDataHandler = lambda text: texts.append(texts.pop() + len(text))
         if (left := left - member.file_size) < 0:
             raise ValueError(f'a workbook (over {MOST_EXPANDED_BYTES / 1e6:g} MB, expanded)')
