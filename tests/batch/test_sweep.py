@@ -102,19 +102,16 @@ def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_path, tmp_path, at_
     assert (output / 'sweep.png').stat().st_size > 10_000
 
 
-@pytest.mark.parametrize(
-    ('changed', 'words'),
-    [
-        ({'grid': {'index_m': [0.2]}}, ['index_m varies planned passes', 'leave trajectory out']),
-        ({'mesh': 'none.stl'}, ['none.stl', 'no such mesh file']),
-        ({'sample': {'count': 2, 'posterior': True}}, ['no model is given']),
-        ({'grid': {'own.gain': [0.1]}}, ["no effect 'own' is in the library or in a model"]),
-        (
-            {'trajectory': None, 'state_topic': None, 'grid': {'index_m': [0.3]}},
-            ['neither their speed nor a target', 'passes: {speed_m_per_s: ...}'],
-        ),
-    ],
-)
+@pytest.mark.parametrize(('changed', 'words'), [
+    ({'grid': {'index_m': [0.2]}}, ['index_m varies planned passes', 'leave trajectory out']),
+    ({'mesh': 'none.stl'}, ['none.stl', 'no such mesh file']),
+    ({'sample': {'count': 2, 'posterior': True}}, ['no model is given']),
+    ({'grid': {'own.gain': [0.1]}}, ["no effect 'own' is in the library or in a model"]),
+    (
+        {'trajectory': None, 'state_topic': None, 'grid': {'index_m': [0.3]}},
+        ['neither their speed nor a target', 'passes: {speed_m_per_s: ...}'],
+    ),
+])  # fmt: skip
 def test_what_does_not_go_together_is_refused_before_any_process_starts(tmp_path, changed, words):
     path = tmp_path / 'sweep.yaml'
     inputs = {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory', 'readings')}
@@ -209,35 +206,38 @@ def test_draws_repeat_with_their_seed_and_have_the_spread_asked_for():
     assert np.std(drawn) == pytest.approx(0.02, rel=4 / 8000**0.5)
 
 
-@pytest.mark.parametrize(
-    ('told', 'words'),
-    [
-        ({'grid': {'K1_cm3_per_s': [1.0]}}, "did you mean 'planar.K1_cm3_per_s'"),
-        ({'grid': {'air_drift.shift_down': [0.1]}}, "did you mean 'air_drift.shift_down_m'"),
-        ({'grid': {'index_m': ['wide']}}, "index_m is 'wide'; expected a number"),
-        ({'grid': {'index_m': [-0.1]}}, 'index_m is -0.1; expected a number above 0'),
-        ({'grid': {'part_pose': [[0, 0, 0]]}}, 'seven numbers'),
-        ({'grid': {'index_m': [0.1]}, 'cases': [{'index_m': 0.2}]}, 'index_m varies twice'),
-        ({'sample': {'count': 10}, 'grid': {'index_m': [0.1] * 200_000}}, '2000000 cases'),
-    ],
-)
+@pytest.mark.parametrize(('told', 'words'), [
+    ({'grid': {'K1_cm3_per_s': [1.0]}}, "did you mean 'planar.K1_cm3_per_s'"),
+    ({'grid': {'air_drift.shift_down': [0.1]}}, "did you mean 'air_drift.shift_down_m'"),
+    ({'grid': {'index_m': ['wide']}}, "index_m is 'wide'; expected a number"),
+    ({'grid': {'index_m': [-0.1]}}, 'index_m is -0.1; expected a number above 0'),
+    ({'grid': {'part_pose': [[0, 0, 0]]}}, 'seven numbers'),
+    ({'grid': {'index_m': [0.1]}, 'cases': [{'index_m': 0.2}]}, 'index_m varies twice'),
+    ({'sample': {'count': 10}, 'grid': {'index_m': [0.1] * 200_000}}, '2000000 cases'),
+    (
+        {
+            'grid': dict.fromkeys(
+                ['index_m', 'standoff_m', 'flow_factor', 'speed_factor'], [0.1] * 2**16
+            )
+        },
+        '18446744073709551616 cases',
+    ),
+])  # fmt: skip
 def test_what_makes_no_sense_is_refused(told, words):
     with pytest.raises(BatchError, match=words.replace('(', r'\(')):
         swept(**told)
 
 
-@pytest.mark.parametrize(
-    ('text', 'words'),
-    [
-        ('mesh: a.stl', 'nothing varies; give one of grid, cases, sample'),
-        ('gird: {index_m: [0.1]}', "unknown key 'gird'; did you mean 'grid'"),
-        ('grid: {index_m: 0.1}', 'index_m is 0.1; expected a list of at least one value'),
-        ('grid: {index_m: {first: 1}}', 'first: A, last: B, steps: N'),
-        ('sample: {vary: {}}', "has no 'sample.count'; give how many draws"),
-        ('sample: {count: 2, vary: {index_m: {normal: [1, -1]}}}', 'standard deviation'),
-        ('[]', 'is not a sweep'),
-    ],
-)
+@pytest.mark.parametrize(('text', 'words'), [
+    ('mesh: a.stl', 'nothing varies; give one of grid, cases, sample'),
+    ('gird: {index_m: [0.1]}', "unknown key 'gird'; did you mean 'grid'"),
+    (f'grid: {{index_m: {300 * "a"}}}', f"index_m is '{56 * 'a'}...; expected a list"),
+    ('grid: {index_m: 0.1}', 'index_m is 0.1; expected a list of at least one value'),
+    ('grid: {index_m: {first: 1}}', 'first: A, last: B, steps: N'),
+    ('sample: {vary: {}}', "has no 'sample.count'; give how many draws"),
+    ('sample: {count: 2, vary: {index_m: {normal: [1, -1]}}}', 'standard deviation'),
+    ('[]', 'is not a sweep'),
+])  # fmt: skip
 def test_a_sweep_file_is_refused_in_a_line(tmp_path, text, words):
     path = tmp_path / 'sweep.yaml'
     path.write_text(text)

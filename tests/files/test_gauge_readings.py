@@ -118,7 +118,7 @@ def test_a_file_that_is_no_table_is_refused(tmp_path):
         opened.writestr('content.xml', '<office:document-content/>')
     for content, kind in (
         (b'x_m,\xff\xfe\x00', 'text'), (b'PK\x03\x04 and none', 'a workbook'),
-        (package.getvalue(), r'a workbook \(an \.ods; save it as \.xlsx\); give a table as CSV'),
+        (package.getvalue(), r'a workbook \(an \.ods or \.xlsb; save it as \.xlsx\); give'),
     ):  # fmt: skip
         path.write_bytes(content)
         with pytest.raises(ReadingsError, match=f'cannot be read as {kind}'):

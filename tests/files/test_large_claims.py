@@ -1,11 +1,12 @@
 """A head that claims more than its file holds is refused before memory is taken for it."""
 
+import json
 import os
 import resource
 import shutil
 import struct
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -52,11 +53,20 @@ def _mcap_chunk(claimed: int, data: bytes) -> bytes:
     return plain[:head] + chunk + data_end + footer + plain[:8]
 
 
-def _doubled(around: bytes) -> bytes:
+def _glb(count: int, nodes: list) -> bytes:
+    """Zeros at these nodes."""
+    head = {'nodes': nodes, 'scenes': [{'nodes': [0]}], 'scene': 0}
+    head |= {'bufferViews': [], 'meshes': [{'primitives': [{'attributes': {'POSITION': 0}}]}]}
+    head['accessors'] = [{'componentType': 5126, 'count': count, 'type': 'VEC3'}]
+    content = json.dumps(head).encode()
+    return struct.pack('<4s4I', b'glTF', 2, 20 + len(content), len(content), J) + content
+
+
+def _doubled(around: bytes, between: bytes = b', ') -> bytes:
     """Thirty lists of YAML, each with the one before it ten times."""
     lines = [b'a0: &a0 {k0: 1}' if b'<<' in around else b'a0: &a0 [1]']
     for k in range(30):
-        aliases = b', '.join([b'*a%d' % k] * 10)
+        aliases = between.join([b'*a%d' % k] * 10)
         lines.append(b'a%d: &a%d ' % (k + 1, k + 1) + around % aliases)
     return b'\n'.join(lines)
 
@@ -79,15 +89,15 @@ def _mcap_with(field: bytes) -> bytes:
     return made.getvalue()
 
 
-def _blanks() -> bytes:
+def _book(sheet: Iterable[bytes], texts: bytes = b'<sst/>') -> bytes:
+    """A workbook with this sheet, given in pieces, and these shared texts."""
     made, old = BytesIO(), zipfile.ZipFile(BytesIO(targets()['workbook'].seeds[0]))
     with zipfile.ZipFile(made, 'w', zipfile.ZIP_DEFLATED) as new:
-        for name in old.namelist():
-            with new.open(name, 'w', force_zip64=True) as member:
-                member.write(old.read(name))
-                if name.endswith('sheet1.xml'):
-                    for _ in range(1500):
-                        member.write(b' ' * 1_000_000)
+        for name in set(old.namelist()) - {'xl/sheet1.xml'}:
+            new.writestr(name, old.read(name))
+        new.writestr('xl/sharedStrings.xml', texts)
+        with new.open('xl/sheet1.xml', 'w', force_zip64=True) as member:
+            member.writelines(sheet)
     return made.getvalue()
 
 
@@ -95,6 +105,7 @@ RAPID_BODIES = {
     'arrays': b'VAR num x{1000,1000,1000}; x{1,1,1}:=1;',
     'copies': b'VAR num x{100000}; VAR num y{100000}; FOR i FROM 1 TO 9999 DO y:=x; ENDFOR',
     'strings': b'VAR string s:="a"; FOR i FROM 1 TO 9999 DO s:=s+s; ENDFOR',
+    'sums': b'VAR num x{100000}; VAR num n; FOR i FROM 1 TO 9999 DO n:=Dim(x+x,1); ENDFOR',
     'empty loops': b'FOR i FROM 1 TO 9998 DO FOR j FROM 1 TO 9998 DO ENDFOR ENDFOR',
 }
 
@@ -121,6 +132,10 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'faces of a text PLY': ('ply', lambda: _ply('ascii', 3, CLAIMED)),
     'triangles of an STL': ('stl', lambda: bytes(80) + struct.pack('<I', CLAIMED) + bytes(50)),
     'a chunk of a glTF': ('glb', lambda: struct.pack('<4s4I', b'glTF', 2, 20, 4 * CLAIMED, J)),
+    'zeros of a glTF': ('glb', lambda: _glb(CLAIMED, [{'mesh': 0}])),
+    'nodes within each other': (
+        'glb', lambda: _glb(3, [{'children': [1]}, {'mesh': 0, 'children': [0]}]),
+    ),
     'a zstd chunk to recover': (
         'mcap_recovery', lambda: _mcap_chunk(2**40, b'\x28\xb5\x2f\xfd' + bytes(20)),
     ),
@@ -128,11 +143,21 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'nested YAML': ('model', lambda: b'- ' * 100_000),
     'aliases of YAML': ('model', lambda: _doubled(b'[%s]')),
     'merged aliases of YAML': ('campaign', lambda: _doubled(b'{<<: [%s]}')),
+    'aliases behind colons of YAML': ('model', lambda: _doubled(b'[{"k":%s}]', b'}, {"k":')),
     'an alias within itself': ('model', lambda: b'effects: &a [*a]'),
     'a zstd chunk': ('mcap', _bomb_chunk),
     'strings of a schema': ('mcap', lambda: _mcap_with(b'string[2000000000] a\n')),
-    'blanks of a workbook': ('workbook', _blanks),
-    'a far row of a workbook': ('worksheet', lambda: _row(b'<row r="1048576"><c r="XFD1"')),
+    'blanks of a workbook': ('workbook', lambda: _book([_row(b'<row><c'), *400 * [10**6 * b' ']])),
+    'a text in many cells': (
+        'workbook', lambda: _book(
+            [_row(b'<row>' + 1000 * b'<c t="s"><v>0</v></c>' + b'<c')],
+            b'<sst><si><t>%s</t></si></sst>' % (10**6 * b'a'),
+        ),
+    ),
+    'a far place with blanks': ('worksheet', lambda: _row(b'<row r="1048576"><c r = "XFD1"')),
+    'cells without a place': (
+        'worksheet', lambda: _row(10**6 * b'<row/>' + b'<row>' + 10**4 * b'<c/>' + b'<c'),
+    ),
     'a cell no sheet has': ('worksheet', lambda: _row(b'<row r="1"><c r="AAAAA999999991"')),
     **{f'{name} of RAPID': ('rapid', partial(_main, body)) for name, body in RAPID_BODIES.items()},
     'calls of RAPID': ('rapid', _calls),
@@ -196,7 +221,7 @@ def test_ten_thousand_headings_are_not_all_shown(file):
     assert 'and 9980 more' in line
 
 
-@pytest.mark.parametrize('text', [b'[' * 100_000, _doubled(b'[%s]')])
+@pytest.mark.parametrize('text', [b'[ #]\n' * 100_000, _doubled(b'[%s]')])
 def test_the_metadata_of_a_bag_end_no_process(text, tmp_path):
     """Parsers written in C would."""
     shutil.copytree(SAMPLES / 'panel_577', tmp_path / 'run')

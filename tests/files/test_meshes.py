@@ -1,6 +1,7 @@
 """Meshes: what is read, put right and refused; their units, and several bodies in one file."""
 
 import importlib.util
+import os
 from pathlib import Path
 
 import numpy as np
@@ -27,13 +28,10 @@ def saved(mesh: trimesh.Trimesh, path, **options):
     return path
 
 
-@pytest.mark.parametrize(
-    ('name', 'options'),
-    [
-        ('part.stl', {'file_type': 'stl_ascii'}), ('PART.STL', {'file_type': 'stl'}),
-        ('part.ply', {'encoding': 'ascii'}), ('part.obj', {}),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(('name', 'options'), [
+    ('part.stl', {'file_type': 'stl_ascii'}), ('PART.STL', {'file_type': 'stl'}),
+    ('part.ply', {'encoding': 'ascii'}), ('part.obj', {}),
+])  # fmt: skip
 def test_formats_give_the_same_part(tmp_path, name, options):
     ball = icosphere(subdivisions=3, radius=0.2)
     surface = read_mesh(saved(ball, tmp_path / name, **options))
@@ -92,6 +90,8 @@ def broken(path, kind):
         path.write_bytes(bytes(range(256)) * 9 * (kind == 'garbage'))
     elif kind == 'truncated':
         path.write_bytes(saved(icosphere(), path).read_bytes()[:32042])
+    elif kind == 'bodies':
+        path.write_text('\no '.join(['v 0 0 0', *(f'{k}\nf 1 1 1' for k in range(21_000))]))
     elif kind == 'points only':
         trimesh.PointCloud(corners).export(path)
     else:
@@ -99,24 +99,28 @@ def broken(path, kind):
     return path
 
 
-@pytest.mark.parametrize(
-    ('name', 'kind', 'says'),
-    [
-        ('part.stl', 'garbage', 'neither a text STL nor'),
-        ('part.ply', 'garbage', 'not readable as a mesh'),
-        ('part.glb', 'garbage', 'not readable as a mesh'),
-        ('part.stl', 'empty file', 'no triangles'),
-        ('part.stl', 'truncated', '32042 bytes, a complete binary one'),
-        ('part.ply', 'not finite', 'not finite'),
-        ('part.stl', 'no area', 'none of its 2 triangles has an area'),
-        ('part.ply', 'points only', 'no triangles'),
-    ],
-)
+@pytest.mark.parametrize(('name', 'kind', 'says'), [
+    ('part.stl', 'garbage', 'neither a text STL nor'),
+    ('part.ply', 'garbage', 'not readable as a mesh'),
+    ('part.glb', 'garbage', 'not readable as a mesh'),
+    ('part.stl', 'empty file', 'no triangles'),
+    ('part.stl', 'truncated', '32042 bytes, a complete binary one'),
+    ('part.ply', 'not finite', 'not finite'),
+    ('part.stl', 'no area', 'none of its 2 triangles has an area'),
+    ('part.ply', 'points only', 'no triangles'),
+    ('part.obj', 'bodies', 'has 21000 bodies, over 20000; join them, or export fewer'),
+])  # fmt: skip
 def test_broken_files_are_refused_in_one_line(tmp_path, name, kind, says):
     path = broken(tmp_path / name, kind)
     line = refusal(MeshError, read_mesh, path)
     assert says in line
     assert line.startswith(str(path))
+
+
+def test_a_pipe_as_a_buffer_is_not_read(tmp_path):
+    os.mkfifo(tmp_path / 'pipe')
+    (tmp_path / 'part.gltf').write_text('{"buffers": [{"uri": "pipe"}]}')
+    assert 'a device or a pipe' in refusal(MeshError, read_mesh, tmp_path / 'part.gltf')
 
 
 def test_absurd_sizes_are_refused_with_the_remedy(tmp_path):

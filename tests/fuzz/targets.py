@@ -193,7 +193,7 @@ def targets() -> dict[str, Target]:
         'ros1': Target('.bag', _bag, [ros1]),
         'mcap': Target('.mcap', _bag, [_mcap()]),
         'mcap_recovery': Target('.mcap', _recovered, [_mcap()]),
-        'model': Target('.yaml', read_model_file, [model], 'posterior: mean: id: &a *a'),
+        'model': Target('.yaml', read_model_file, [model], r'&a :*a !!bool !!int "" "\ud800"'),
         'metadata': Target(
             '.yaml', _metadata, [(SAMPLES / 'panel_577/metadata.yaml').read_bytes()],
             'custom_data: model_sha256: &a *a null [] {}',

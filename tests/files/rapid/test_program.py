@@ -11,6 +11,7 @@ import refusals
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.rapid import program as rapid
 from paint_deposition.files.rapid.program import module_text, read_program
+from paint_deposition.motion import programmed
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import GunSwitch, Move
 
@@ -167,59 +168,56 @@ DECLARED = (
 START = f'MoveL {target(0)},v100,z10,tool0'
 
 
-@pytest.mark.parametrize(
-    ('body', 'says'),
-    [
-        ('FOR i FROM 1 TO n DO\nMoveL p,v1,fine,t;\nENDFOR',
-         'line 4: movel in line 5 is inside FOR and depends on n is not declared'),
-        ('WHILE TRUE DO\nPaintL p,v1,fine,t;\nENDWHILE', 'line 4: WHILE never ends; name the'),
-        ('WHILE reg1<1 DO\nreg2:=reg2+1;\nENDWHILE', 'line 4: WHILE never ends; name the'),
-        ('FOR i FROM 1 TO 1E9 DO\nStop;\nENDFOR', 'line 4: FOR takes 10000 turns or more'),
-        ('IF TestDI(di)\nMoveL p,v1,fine,t;', 'line 4: movel in line 5 is inside IF and depends'),
-        ('TEST GInput(gi)\nCASE 1:\nSetBrush 2;\nENDTEST', 'setbrush in line 6 is inside TEST'),
-        ('TPReadNum reg1,"Style";\nWHILE reg1>0 DO\nRETURN;\nENDWHILE', 'what tpreadnum reads in'),
-        ('MoveL pElse,v100,fine,tBell;', 'line 4: pelse is not declared in the modules given'),
-        ('MoveL row{2},v100,fine,tBell;', 'line 4: row is not declared in the modules given'),
-        (f'MoveLSync {target(1)},v100,fine,tBell,"rGun";', 'line 4: movelsync is not understood'),
-        ('SearchL di,p,p,v100,tBell;', 'line 4: searchl is not understood, and may move the'),
-        ('IF TestDI(di) Incr reg1;\nSetBrush reg1;', 'line 5: reg1, which depends on testdi()'),
-        (f'TriggL {target(1)},v1,on,z1,tBell;', 'line 4: on is not declared in the modules given'),
-        ('GOTO again;', 'line 4: goto is not understood'),
-        (r'MoveL p,v100,fine,tBell\Corr;', r'movel has no option \corr'),
-        ('SetDO \\SDelay:=0.1,doGun,1;', 'line 4: setdo of the gun by time is not followed'),
-        ('Set doGun;\nWaitDI di,1;', 'line 5: waitdi waits with the gun open'),
-        ('Set doGun;\nMoveAbsJ [[0],[0]],v1,fine,tBell;', 'moveabsj sprays, and its joint ang'),
-        (f'PaintL {target(1)},v100,bdMain,z10,tBell;', 'line 4: paintl takes bdmain beside'),
-        ('UseBrushTab a;\nUseBrushTab b;', 'line 5: the brush table b after a: a number would'),
-        ('SetBrush 1\\T:=3;', 'line 4: setbrush with t: give one of X, Y and Z'),
-        (f'MoveExtJ [[0],[0]],v100,fine;{START};',
-         'line 4: an external axis moves, and the work objects stand still'),
-        ('p.trans.z:=7;', 'line 4: p has no such part to assign to'),
-        (f'MoveL {target(1)},v100;', 'movel needs a target, a speed, a zone and a tool'),
-        (START, "line 5: 'endproc' is not expected here; is a ';' missing before it?"),
-        ('main;', 'procedure main calls itself'),
-        ('MoveL #;', "line 4: '#' is not RAPID"),
-        ('', 'has no moves of the TCP; nothing to read'),
-        (r'MoveAbsJ [[0,0,0,0,0,0],[0,0,0,0,0,0]],v100,fine,tBell;', 'has no moves of the TCP'),
-        (f'MoveL {target(1)},v100,fine,tStill;', 'tstill stands still'),
-        (rf'{START}\WObj:=wHeld;', 'holds the work object wheld'),
-        (f'{START};'.replace('1,0,0,0', '1,0,0,0.2'),
-         'test.mod line 4: quaternion [1.0, 0.0, 0.0, 0.2] has the norm 1.0198'),
-        (rf'{START}\WObj:=wBad;', 'is no position [x, y'),
-        (f'MoveL {target("1e400")},v100,z10,tool0;', 'is no position [x, y'),
-        ('none:=1/0;', 'line 4: division by zero'),
-        ('SetBrush;', 'setbrush needs a number'),
-        ('Add reg1;', 'line 4: add takes 2 arguments, not 1'),
-        ('Incr;', 'line 4: incr takes 1 argument, not 0'),
-        ('SetBrush 2.5;', 'line 4: setbrush takes the number of a brush, not 2.5'),
-        ('TriggIO tr\\DOp:=doGun;', 'triggio needs a number'),
-        (f'MoveL {target(0)},v100\\V:=[1],z10,tool0;', 'speed is [1.0]; a number expected'),
-        (f'{START};MoveL {target(9)},v100\\T:=0,z1,tool0;',
-         'line 4: a duration of 0 s; give one above 0'),
-        (f'MoveL Offs({target(0)},0,0,[1]),v1,z1,tool0;',
-         '[0.0, 0.0, [1.0]] is no displacement; give three numbers'),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(('body', 'says'), [
+    ('FOR i FROM 1 TO n DO\nMoveL p,v1,fine,t;\nENDFOR',
+     'line 4: movel in line 5 is inside FOR and depends on n is not declared'),
+    ('WHILE TRUE DO\nPaintL p,v1,fine,t;\nENDWHILE', 'line 4: WHILE never ends; name the'),
+    ('WHILE reg1<1 DO\nreg2:=reg2+1;\nENDWHILE', 'line 4: WHILE never ends; name the'),
+    ('FOR i FROM 1 TO 1E9 DO\nStop;\nENDFOR', 'line 4: FOR takes 10000 turns or more'),
+    ('IF TestDI(di)\nMoveL p,v1,fine,t;', 'line 4: movel in line 5 is inside IF and depends'),
+    ('TEST GInput(gi)\nCASE 1:\nSetBrush 2;\nENDTEST', 'setbrush in line 6 is inside TEST'),
+    ('TPReadNum reg1,"Style";\nWHILE reg1>0 DO\nRETURN;\nENDWHILE', 'what tpreadnum reads in'),
+    ('MoveL pElse,v100,fine,tBell;', 'line 4: pelse is not declared in the modules given'),
+    ('MoveL row{2},v100,fine,tBell;', 'line 4: row is not declared in the modules given'),
+    (f'MoveLSync {target(1)},v100,fine,tBell,"rGun";', 'line 4: movelsync is not understood'),
+    ('SearchL di,p,p,v100,tBell;', 'line 4: searchl is not understood, and may move the'),
+    ('IF TestDI(di) Incr reg1;\nSetBrush reg1;', 'line 5: reg1, which depends on testdi()'),
+    (f'TriggL {target(1)},v1,on,z1,tBell;', 'line 4: on is not declared in the modules given'),
+    ('GOTO again;', 'line 4: goto is not understood'),
+    (r'MoveL p,v100,fine,tBell\Corr;', r'movel has no option \corr'),
+    ('SetDO \\SDelay:=0.1,doGun,1;', 'line 4: setdo of the gun by time is not followed'),
+    ('Set doGun;\nWaitDI di,1;', 'line 5: waitdi waits with the gun open'),
+    ('Set doGun;\nMoveAbsJ [[0],[0]],v1,fine,tBell;', 'moveabsj sprays, and its joint ang'),
+    (f'PaintL {target(1)},v100,bdMain,z10,tBell;', 'line 4: paintl takes bdmain beside'),
+    ('UseBrushTab a;\nUseBrushTab b;', 'line 5: the brush table b after a: a number would'),
+    ('SetBrush 1\\T:=3;', 'line 4: setbrush with t: give one of X, Y and Z'),
+    (f'MoveExtJ [[0],[0]],v100,fine;{START};',
+     'line 4: an external axis moves, and the work objects stand still'),
+    ('p.trans.z:=7;', 'line 4: p has no such part to assign to'),
+    (f'MoveL {target(1)},v100;', 'movel needs a target, a speed, a zone and a tool'),
+    (START, "line 5: 'endproc' is not expected here; is a ';' missing before it?"),
+    ('main;', 'procedure main calls itself'),
+    ('MoveL #;', "line 4: '#' is not RAPID"),
+    ('', 'has no moves of the TCP; nothing to read'),
+    (r'MoveAbsJ [[0,0,0,0,0,0],[0,0,0,0,0,0]],v100,fine,tBell;', 'has no moves of the TCP'),
+    (f'MoveL {target(1)},v100,fine,tStill;', 'tstill stands still'),
+    (rf'{START}\WObj:=wHeld;', 'holds the work object wheld'),
+    (f'{START};'.replace('1,0,0,0', '1,0,0,0.2'),
+     'test.mod line 4: quaternion [1.0, 0.0, 0.0, 0.2] has the norm 1.0198'),
+    (rf'{START}\WObj:=wBad;', 'is no position [x, y'),
+    (f'MoveL {target("1e400")},v100,z10,tool0;', 'is no position [x, y'),
+    ('none:=1/0;', 'line 4: division by zero'),
+    ('SetBrush;', 'setbrush needs a number'),
+    ('Add reg1;', 'line 4: add takes 2 arguments, not 1'),
+    ('Incr;', 'line 4: incr takes 1 argument, not 0'),
+    ('SetBrush 2.5;', 'line 4: setbrush takes the number of a brush, not 2.5'),
+    ('TriggIO tr\\DOp:=doGun;', 'triggio needs a number'),
+    (f'MoveL {target(0)},v100\\V:=[1],z10,tool0;', 'speed is [1.0]; a number expected'),
+    (f'{START};MoveL {target(9)},v100\\T:=0,z1,tool0;',
+     'line 4: a duration of 0 s; give one above 0'),
+    (f'MoveL Offs({target(0)},0,0,[1]),v1,z1,tool0;',
+     '[0.0, 0.0, [1.0]] is no displacement; give three numbers'),
+])  # fmt: skip
 def test_what_cannot_be_followed_is_named(read, body, says):
     assert says in refusal(read, body, DECLARED)
 
@@ -317,28 +315,24 @@ def test_a_tool_that_only_turns_takes_its_time(motion):
     assert np.all(np.ptp(trajectory.positions_m, axis=0) == 0.0)
 
 
-@pytest.mark.parametrize(
-    'move',
-    [
-        f'MoveC {down(100, 100)},{down(0, 200)},v100\\T:=4,fine,tool0;',
-        f'MoveL {down(0, wxyz="0,0.8,0.6,0")},v100\\T:=4,fine,tool0;',
-        f'VelSet 50,5000;MoveL {down(100)},v100\\T:=2,fine,tool0;',
-    ],
-)
+@pytest.mark.parametrize('move', [
+    f'MoveC {down(100, 100)},{down(0, 200)},v100\\T:=4,fine,tool0;',
+    f'MoveL {down(0, wxyz="0,0.8,0.6,0")},v100\\T:=4,fine,tool0;',
+    f'VelSet 50,5000;MoveL {down(100)},v100\\T:=2,fine,tool0;',
+])  # fmt: skip
 def test_a_move_takes_the_time_that_it_is_given(motion, move):
     trajectory = motion(f'MoveL {down(0)},v100,fine,tool0;{move}')
     assert trajectory.duration_s == pytest.approx(4.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ('end', 'speed', 'words'),
-    [
-        ('', '', 'a single move'),
-        (down(1), '[0,500,0,0]', 'speed 0 m/s'),
-        (down('1e12'), 'v100', r'line 5: a move of 1e\+09 m at 0.1 m/s takes .* h'),
-    ],
-)
-def test_what_is_no_motion_is_refused(motion, end, speed, words):
+@pytest.mark.parametrize(('end', 'speed', 'words'), [
+    ('', '', 'a single move'),
+    (down(1000), f'v100,fine,tool0;MoveL {down(0)},v100', 'line 5: the program runs for over'),
+    (down(1), '[0,500,0,0]', 'speed 0 m/s'),
+    (down('1e12'), 'v100', r'line 5: a move of 1e\+09 m at 0.1 m/s takes .* h'),
+])  # fmt: skip
+def test_what_is_no_motion_is_refused(motion, end, speed, words, monkeypatch):
+    monkeypatch.setattr(programmed, 'LONGEST_S', 9.0)
     second = f'MoveL {end},{speed},fine,tool0;' if end else ''
     with pytest.raises(RecordingError, match=words):
         motion(f'MoveL {down(0)},v500,fine,tool0;\n{second}')

@@ -35,16 +35,13 @@ def listing(labels: str) -> str:
 IN_ORDER = listing('1 2 3 4 5 6')
 
 
-@pytest.mark.parametrize(
-    ('text', 'measured'),
-    [
-        ('DFT\n20,5\nn/a\n21\n22\nOL\n23', [1, 3, 4, 6]),
-        ('time,DFT\n8:00,20.5\n8:01,\n8:02,21\n8:03,22\n8:04,\n8:05,23\nend,\n', [1, 3, 4, 6]),
-        ('DFT\n\n20.5\n21\n22\n\n\n\n23\n24\n25\n', [1, 2, 3, 4, 5, 6]),
-        ('no,DFT\n1,20\n2,21\n4,22\n5,22\n', [1, 2, 4, 5]),
-        ('no,DFT\n1,20\n2,21\n3,n/a\n4,22\n5,22\n6,---\n', [1, 2, 4, 5]),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(('text', 'measured'), [
+    ('DFT\n20,5\nn/a\n21\n22\nOL\n23', [1, 3, 4, 6]),
+    ('time,DFT\n8:00,20.5\n8:01,\n8:02,21\n8:03,22\n8:04,\n8:05,23\nend,\n', [1, 3, 4, 6]),
+    ('DFT\n\n20.5\n21\n22\n\n\n\n23\n24\n25\n', [1, 2, 3, 4, 5, 6]),
+    ('no,DFT\n1,20\n2,21\n4,22\n5,22\n', [1, 2, 4, 5]),
+    ('no,DFT\n1,20\n2,21\n3,n/a\n4,22\n5,22\n6,---\n', [1, 2, 4, 5]),
+])  # fmt: skip
 @pytest.mark.parametrize('names', ['{}', 'P00{}'])
 def test_a_missing_reading_keeps_its_number(file, text, measured, names):
     listed = listing(' '.join(names.format(k) for k in range(1, 7)))
@@ -71,23 +68,20 @@ def test_a_lone_heading_keeps_its_unit(file, heading, mark):
     assert 'in mil from' in readings.understood
 
 
-@pytest.mark.parametrize(
-    'text',
-    [
-        'DFT\n20\n21\n',
-        'DFT\n20\n\n21\n',
-        'no,DFT\n1,20\n2,21\n3,22\n',
-        'DFT\n' + '20\n' * 7,
-        # A blank line may part two groups: which reading is missing is not known.
-        'DFT\n20\n21\n\n22\n23\n24\n',
-        'DFT\n20\n21\n\n22\nn/a\n23\n',
-        # Neither headings again nor a remark with a number are readings.
-        'DFT\n20\n21\n22\nDFT\n23\n24\n',
-        'time,DFT\n8:00,20\n8:01,21\nNote 2,\n' + '8:02,22\n' * 3,
-        'time,who,DFT\n8:00,M,20\n8:01,M,21\nBatch,2,\n' + '8:02,M,22\n' * 3,
-        'time,DFT\n8:00,20\n8:01,21\n\n8:02,22\n8:03,23\n8:04,24\n',
-    ],
-)
+@pytest.mark.parametrize('text', [
+    'DFT\n20\n21\n',
+    'DFT\n20\n\n21\n',
+    'no,DFT\n1,20\n2,21\n3,22\n',
+    'DFT\n' + '20\n' * 7,
+    # A blank line may part two groups: which reading is missing is not known.
+    'DFT\n20\n21\n\n22\n23\n24\n',
+    'DFT\n20\n21\n\n22\nn/a\n23\n',
+    # Neither headings again nor a remark with a number are readings.
+    'DFT\n20\n21\n22\nDFT\n23\n24\n',
+    'time,DFT\n8:00,20\n8:01,21\nNote 2,\n' + '8:02,22\n' * 3,
+    'time,who,DFT\n8:00,M,20\n8:01,M,21\nBatch,2,\n' + '8:02,M,22\n' * 3,
+    'time,DFT\n8:00,20\n8:01,21\n\n8:02,22\n8:03,23\n8:04,24\n',
+])  # fmt: skip
 def test_readings_in_order_are_refused_if_their_number_is_not_that_of_the_points(file, text):
     with pytest.raises(
         ReadingsError, match=r'readings in order for the 6 points .*; write n/a in'
@@ -116,15 +110,12 @@ def test_labels_under_other_headings_are_known(file, heading):
     assert readings.positions_m[:, 0].tolist() == [0.002, 0.001]
 
 
-@pytest.mark.parametrize(
-    ('listed', 'message'),
-    [
-        ('label,spot,x,y,z\n1,2,0,0,0\n', "in 'label', 'spot'; rename one of them in points.csv"),
-        ('point,x,y\n1,0,0\n', 'no columns are known as x, y, z'),
-        ('point,x,y,z\n', 'no points below the header'),
-        ('A1,0,0,0\n', "begins with 'A1 0 0 0'.; put a row of headings on top$"),
-    ],
-)
+@pytest.mark.parametrize(('listed', 'message'), [
+    ('label,spot,x,y,z\n1,2,0,0,0\n', "in 'label', 'spot'; rename one of them in points.csv"),
+    ('point,x,y\n1,0,0\n', 'no columns are known as x, y, z'),
+    ('point,x,y,z\n', 'no points below the header'),
+    ('A1,0,0,0\n', "begins with 'A1 0 0 0'.; put a row of headings on top$"),
+])  # fmt: skip
 def test_what_is_wrong_with_a_list_of_points_is_put_right_in_it(file, listed, message):
     with pytest.raises(ReadingsError, match=message):
         read_readings(file('b.csv', 'DFT\n20\n'), file('points.csv', listed))
@@ -139,16 +130,13 @@ def test_points_that_are_not_listed_are_named_all_at_once(file):
         read_readings(file('b.csv', text), file('twice.csv', twice))
 
 
-@pytest.mark.parametrize(
-    ('heading', 'um'),
-    [
-        ('DFT [mil]', 25.4), ('Dicke in mm', 1000.0), ('Trockenschichtdicke [um]', 1.0),
-        ('DFT (thou)', 25.4), ('DFT in micrometers', 1.0), ('Dicke [Mikrometer]', 1.0),
-        ('DFT (ist) [mil]', 25.4), ('Épaisseur [mil]', 25.4), ('Blechdicke;DFT [mil]', 25.4),
-        ('Dry film thickness [µm]', 1.0), ('Total DFT [mil]', 25.4), ('Average DFT', 1.0),
-        ('Paint thickness [µm]', 1.0), ('Sheet thickness;Clearcoat DFT [µm]', 1.0),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(('heading', 'um'), [
+    ('DFT [mil]', 25.4), ('Dicke in mm', 1000.0), ('Trockenschichtdicke [um]', 1.0),
+    ('DFT (thou)', 25.4), ('DFT in micrometers', 1.0), ('Dicke [Mikrometer]', 1.0),
+    ('DFT (ist) [mil]', 25.4), ('Épaisseur [mil]', 25.4), ('Blechdicke;DFT [mil]', 25.4),
+    ('Dry film thickness [µm]', 1.0), ('Total DFT [mil]', 25.4), ('Average DFT', 1.0),
+    ('Paint thickness [µm]', 1.0), ('Sheet thickness;Clearcoat DFT [µm]', 1.0),
+])  # fmt: skip
 def test_headings_of_the_film_in_english_and_german(file, heading, um):
     blech = '0,8;' if ';' in heading else ''
     text = f'Punkt;x [m];y [m];z [m];{heading};Soll [µm];Std [µm]\nP;0;0;0;{blech}1,5;30;2\n'
@@ -173,14 +161,11 @@ def test_measured_places_count_before_nominal_ones(file):
     assert read_readings(file('a.csv', text)).positions_m.tolist() == [[4.0, 5.0, 6.0]]
 
 
-@pytest.mark.parametrize(
-    ('films', 'doubt'),
-    [
-        ('20.1 21.2 22.4 23.1 21.7', 'its last value, 21.7, may be the mean of the rest, and cou'),
-        ('20 21 23 21.33 1.53 20 23', 'last 4 values, 21.33, 1.53, 20, 23, may be statistics of'),
-        ('20.1 21.2 22.4 23.1 21.8', ''), ('20 20 20 20', ''),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(('films', 'doubt'), [
+    ('20.1 21.2 22.4 23.1 21.7', 'its last value, 21.7, may be the mean of the rest, and cou'),
+    ('20 21 23 21.33 1.53 20 23', 'last 4 values, 21.33, 1.53, 20, 23, may be statistics of'),
+    ('20.1 21.2 22.4 23.1 21.8', ''), ('20 20 20 20', ''),
+])  # fmt: skip
 @pytest.mark.parametrize('more', [0, 1])
 def test_unlabelled_statistics_below_readings_are_warned_of(file, films, doubt, more):
     """Or named where there are more readings than points."""
@@ -241,29 +226,26 @@ COUNTED = 'Nr;x_mm;y_mm;z_mm;DFT\n7;100;0;50;21\n3;100;0;200;22\n'
 COMPASS = ''.join(f'{label};{k};0;1;2{k}\n' for k, label in enumerate('ENWSRXV'))
 
 
-@pytest.mark.parametrize(
-    ('text', 'listed', 'columns', 'labels', 'said'),
-    [
-        ('point,x_m,y_m,z_m,DFT\n#1,0,0,0,20\n# of the left door\n#2,1,0,0,21\n3,2,0,0,22\n',
-         '', {}, '3', 'left out: 2 rows that begin with #'),
-        # Compass points and letters are no statistics where they have a place or are listed.
-        (f'{PLACED}{COMPASS}Mean;;;;23\ns;;;;2\nn;;;;7\n', '', {}, 'E N W S R X V',
-         '3 rows of statistics'),
-        ('point,DFT\nN,20\nS,21\nX,22\nMean,21\nn,3\n', 'N S X', {}, 'N S X', ''),
-        # An empty cell of a numbered column keeps its row.
-        ('21,5;A\n22,5;A\n;A\n19,5;A\n', 'P1 P2 P3 P4', {'thickness': 1}, 'P1 P2 P4', ''),
-        # A number names a point: in any order, some of them again, where it counts no repeats.
-        ('no;DFT\n3;20\n1;21\n2;22\n', '1 2 3 4', {}, '3 1 2', ''),
-        ('no;DFT\n3;20\n1;21\n3;22\n1;20\n', '1 2 3 4', {}, '3 1 3 1', ''),
-        ('no;DFT\n1;20\n1;21\n2;22\n2;20\n', '1 2 3 4', {}, '1 1 2 2', ''),
-        (f'{COUNTED}7;100;0;50;23\n', '', {}, '7 3 7', ''),
-        (f'{COUNTED}8;100;0;50;23\n', '', {}, 'line_2 line_3 line_2', ''),
-        # A zone whose first reading is missing; rounds over all points.
-        ('Zone;no;DFT\nA;1;20\nA;2;21\nB;1;n/a\nB;2;22\n', '1 2 3 4', {}, '1 2 4', ''),
-        ('Round;No.;DFT\n' + ''.join(f'{r};{k};2{r}\n' for r in (1, 2) for k in (1, 2, 3, 4)),
-         '1 2 3 4', {}, '1 2 3 4 1 2 3 4', ''),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(('text', 'listed', 'columns', 'labels', 'said'), [
+    ('point,x_m,y_m,z_m,DFT\n#1,0,0,0,20\n# of the left door\n#2,1,0,0,21\n3,2,0,0,22\n',
+     '', {}, '3', 'left out: 2 rows that begin with #'),
+    # Compass points and letters are no statistics where they have a place or are listed.
+    (f'{PLACED}{COMPASS}Mean;;;;23\ns;;;;2\nn;;;;7\n', '', {}, 'E N W S R X V',
+     '3 rows of statistics'),
+    ('point,DFT\nN,20\nS,21\nX,22\nMean,21\nn,3\n', 'N S X', {}, 'N S X', ''),
+    # An empty cell of a numbered column keeps its row.
+    ('21,5;A\n22,5;A\n;A\n19,5;A\n', 'P1 P2 P3 P4', {'thickness': 1}, 'P1 P2 P4', ''),
+    # A number names a point: in any order, some of them again, where it counts no repeats.
+    ('no;DFT\n3;20\n1;21\n2;22\n', '1 2 3 4', {}, '3 1 2', ''),
+    ('no;DFT\n3;20\n1;21\n3;22\n1;20\n', '1 2 3 4', {}, '3 1 3 1', ''),
+    ('no;DFT\n1;20\n1;21\n2;22\n2;20\n', '1 2 3 4', {}, '1 1 2 2', ''),
+    (f'{COUNTED}7;100;0;50;23\n', '', {}, '7 3 7', ''),
+    (f'{COUNTED}8;100;0;50;23\n', '', {}, 'line_2 line_3 line_2', ''),
+    # A zone whose first reading is missing; rounds over all points.
+    ('Zone;no;DFT\nA;1;20\nA;2;21\nB;1;n/a\nB;2;22\n', '1 2 3 4', {}, '1 2 4', ''),
+    ('Round;No.;DFT\n' + ''.join(f'{r};{k};2{r}\n' for r in (1, 2) for k in (1, 2, 3, 4)),
+     '1 2 3 4', {}, '1 2 3 4 1 2 3 4', ''),
+])  # fmt: skip
 def test_which_rows_are_readings_and_of_which_points(file, text, listed, columns, labels, said):
     points = file('p.csv', listing(listed)) if listed else None
     readings = read_readings(file('a.csv', text), points, Layout(columns=columns))
@@ -271,29 +253,26 @@ def test_which_rows_are_readings_and_of_which_points(file, text, listed, columns
     assert said in readings.understood
 
 
-@pytest.mark.parametrize(
-    ('text', 'columns', 'message'),
-    [
-        ('20,5\n21,5\n', {'thickness': 1}, "'20,5' in line 1 may be two numbers or one with a"),
-        ('Block;Nr;Messwert\n1;1;20\n1;2;21\n2;1;22\n', {}, "'Nr' counts anew in each Block"),
-        ('#,F,N\nGauge,1,2\n', {}, "the thickness .columns: '#', 'F', 'N'"),
-        ('point,DFT\n1,20\n2,<5\n', {}, "line 3: DFT is '<5'; expected .*, or n/a where there is"),
-        ('point;DFT\n1;20\n;21\n2;22\n', {}, 'line 3: the point has no label'),
-        ('point,DFT\n1,20\npoint,DFT,Units\n2,1,mil\n', {}, 'lines 1 and 3 are headings of two'),
-        ('Punkt;Nassschichtdicke\n1;45\n', {}, "thickness .columns: 'Punkt', 'Nassschichtdicke'"),
-        ('no;DFT soll;Dicke Lack\n1;2;3\n', {}, "thickness .columns: 'no', 'DFT soll', 'Dicke"),
-        ('point,DFT\n1,20,5\n2,21,5\n', {}, 'with decimal commas, put semicolons between the col'),
-        ('point;DFT [mm]\n1;24\n', {}, 'is 24000; .* it may be in another unit than is said'),
-        ('point;DFT\n1;24 µm\n2;1 mil\n', {}, "DFT is '24 µm'; .* write the one unit in the hea"),
-        ('Units;mils\n\npoint;DFT [µm]\n1;24\n', {}, 'thickness is in mil and µm; give all of'),
-        ('Meas. pt,DFT\n2,22\n1,21\n3,23\n4,24\n5,25\n6,26\n', {},
-         "the column 'Meas. pt' holds the labels of p.csv .* say columns: {point: Meas. pt}"),
-        ('Meas. pt,X [mm],Bake history\nA,1,2\n', {}, "columns: 'Meas. pt', 'X .mm.', 'Bake hist"),
-        ('a,x,y,z,DFT\n,m,m,m,ell\nP,0,0,0,1\n', {}, "thickness .*; 'DFT' is in 'ell': give it"),
-        ('Point;Inner thickness;Outer thickness\nA;1;2\n', {},
-         "it may be 'Inner thickness' or 'Outer thickness': name one with columns: {thick"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(('text', 'columns', 'message'), [
+    ('20,5\n21,5\n', {'thickness': 1}, "'20,5' in line 1 may be two numbers or one with a"),
+    ('Block;Nr;Messwert\n1;1;20\n1;2;21\n2;1;22\n', {}, "'Nr' counts anew in each Block"),
+    ('#,F,N\nGauge,1,2\n', {}, "the thickness .columns: '#', 'F', 'N'"),
+    ('point,DFT\n1,20\n2,<5\n', {}, "line 3: DFT is '<5'; expected .*, or n/a where there is"),
+    ('point;DFT\n1;20\n;21\n2;22\n', {}, 'line 3: the point has no label'),
+    ('point,DFT\n1,20\npoint,DFT,Units\n2,1,mil\n', {}, 'lines 1 and 3 are headings of two'),
+    ('Punkt;Nassschichtdicke\n1;45\n', {}, "thickness .columns: 'Punkt', 'Nassschichtdicke'"),
+    ('no;DFT soll;Dicke Lack\n1;2;3\n', {}, "thickness .columns: 'no', 'DFT soll', 'Dicke"),
+    ('point,DFT\n1,20,5\n2,21,5\n', {}, 'with decimal commas, put semicolons between the col'),
+    ('point;DFT [mm]\n1;24\n', {}, 'is 24000; .* it may be in another unit than is said'),
+    ('point;DFT\n1;24 µm\n2;1 mil\n', {}, "DFT is '24 µm'; .* write the one unit in the hea"),
+    ('Units;mils\n\npoint;DFT [µm]\n1;24\n', {}, 'thickness is in mil and µm; give all of'),
+    ('Meas. pt,DFT\n2,22\n1,21\n3,23\n4,24\n5,25\n6,26\n', {},
+     "the column 'Meas. pt' holds the labels of p.csv .* say columns: {point: Meas. pt}"),
+    ('Meas. pt,X [mm],Bake history\nA,1,2\n', {}, "columns: 'Meas. pt', 'X .mm.', 'Bake hist"),
+    ('a,x,y,z,DFT\n,m,m,m,ell\nP,0,0,0,1\n', {}, "thickness .*; 'DFT' is in 'ell': give it"),
+    ('Point;Inner thickness;Outer thickness\nA;1;2\n', {},
+     "it may be 'Inner thickness' or 'Outer thickness': name one with columns: {thick"),
+])  # fmt: skip
 def test_tables_without_places_that_could_mislead_are_refused(file, text, columns, message):
     with pytest.raises(ReadingsError, match=message):
         read_readings(file('a.csv', text), file('p.csv', IN_ORDER), Layout(columns=columns))

@@ -80,15 +80,12 @@ def test_the_last_columns_of_a_measuring_machine_are_the_normal():
     assert readings.thickness_um.tolist() == [21.5, 22.5]
 
 
-@pytest.mark.parametrize(
-    ('headings', 'layout', 'layers', 'films'),
-    [
-        ('Spot;E-coat;Base coat;Clearcoat;Total', {}, 'e-coat base clear total', '20 15 40 75'),
-        ('Punkt;Schicht 1;Schicht 2;Schicht 3;Gesamt', {}, 'layer1 layer2 layer3 total',
-         '20 15 40 75'),
-        ('Point;a;b;c;d', {'layers': {'mica': 'b', 'clear': 4}}, 'mica clear', '15 40'),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(('headings', 'layout', 'layers', 'films'), [
+    ('Spot;E-coat;Base coat;Clearcoat;Total', {}, 'e-coat base clear total', '20 15 40 75'),
+    ('Punkt;Schicht 1;Schicht 2;Schicht 3;Gesamt', {}, 'layer1 layer2 layer3 total',
+     '20 15 40 75'),
+    ('Point;a;b;c;d', {'layers': {'mica': 'b', 'clear': 4}}, 'mica clear', '15 40'),
+])  # fmt: skip
 def test_columns_may_be_layers(headings, layout, layers, films, file, points):
     path = file('f.csv', f'{headings}\nP1;20;15;40;75\nP2;;16;;\n')
     readings = read_readings(path, points, Layout(columns=layout))
@@ -106,19 +103,16 @@ def test_columns_of_repeats_and_a_layer_that_is_none_can_be_named(file, points):
     assert set(readings.layer.tolist()) == {''}
 
 
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        (
-            (LAYOUTS / 'byk.csv').read_text() + 'C;1;90;20\n',
-            "'No.' counts anew in each Checkzone; give a column 'point'",
-        ),
-        ('No.;DFT\n1;20\n2;21\n1;22\n2;21\n3;20\n', "'No.' counts anew; give a column 'point'"),
-        ('Reading;Thickness\n21,5;0,8\n22,5;0,8\n', "'Reading' counts the readings of a DeFelsko"),
-        # One label throughout is that of the part, but not one that nearly is a point's.
-        ('point;DFT\n' + 'P9;20\n' * 4, "the readings are called 'P9' to 'P9', and there is"),
-    ],
-)
+@pytest.mark.parametrize(('text', 'message'), [
+    (
+        (LAYOUTS / 'byk.csv').read_text() + 'C;1;90;20\n',
+        "'No.' counts anew in each Checkzone; give a column 'point'",
+    ),
+    ('No.;DFT\n1;20\n2;21\n1;22\n2;21\n3;20\n', "'No.' counts anew; give a column 'point'"),
+    ('Reading;Thickness\n21,5;0,8\n22,5;0,8\n', "'Reading' counts the readings of a DeFelsko"),
+    # One label throughout is that of the part, but not one that nearly is a point's.
+    ('point;DFT\n' + 'P9;20\n' * 4, "the readings are called 'P9' to 'P9', and there is"),
+])  # fmt: skip
 def test_a_count_or_a_wrong_label_names_no_point(text, message, file, points):
     with pytest.raises(ReadingsError, match=message):
         read_readings(file('f.csv', text), points)

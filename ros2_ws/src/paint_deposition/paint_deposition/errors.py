@@ -3,8 +3,8 @@
 import difflib
 from collections.abc import Iterable, Sequence
 
-# Letters of a value in a message.
-LONGEST_QUOTED = 60
+# Letters in a message: of a value, and of what a library says is wrong.
+LONGEST_QUOTED, LONGEST_REASON = 60, 120
 
 
 class PaintError(Exception):
@@ -34,13 +34,18 @@ class BatchError(PaintError):
 def some(names: Sequence[str], most: int) -> str:
     """'a, b and 3 more': so many of the names at most, for a message."""
     more = f' and {len(names) - most} more' if len(names) > most else ''
-    return ', '.join(names[:most]) + more
+    return ', '.join(map(shortened, names[:most])) + more
 
 
 def quoted(value: object) -> str:
     """A value for a message, cut where it is long: it may be the content of another file."""
-    text = repr(value)
-    return text if len(text) <= LONGEST_QUOTED else f'{text[: LONGEST_QUOTED - 3]}...'
+    return shortened(repr(value))
+
+
+def shortened(text: str, most: int = LONGEST_QUOTED) -> str:
+    """A text for a message: in one line, and of so many letters."""
+    text = ' '.join(text[: 10 * most].split())
+    return text if len(text) <= most else f'{text[: most - 3]}...'
 
 
 def did_you_mean(name: object, known: Iterable[str], otherwise: str = '') -> str:
@@ -58,4 +63,4 @@ def did_you_mean(name: object, known: Iterable[str], otherwise: str = '') -> str
     near = near or difflib.get_close_matches(str(name), known, n=1, cutoff=0.4)
     if near:
         return f'did you mean {near[0]!r}?'
-    return otherwise or f'there are: {", ".join(known) or "none"}'
+    return otherwise or f'there are: {some(known, 40) or "none"}'

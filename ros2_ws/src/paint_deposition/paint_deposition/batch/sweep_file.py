@@ -1,5 +1,6 @@
 """Sweep files: what is fixed and what varies, by the grid, the cases and the draws of a sweep."""
 
+import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -14,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import BatchError, did_you_mean
+from paint_deposition.errors import BatchError, did_you_mean, quoted
 from paint_deposition.files.atomic import read_yaml
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
@@ -61,7 +62,7 @@ def _grid(given: dict[str, Any]) -> dict[str, list[Any]]:
                 continue
         if not isinstance(listed, list) or not listed:
             raise ValueError(
-                f'{name} is {listed!r}; expected a list of at least one value, or '
+                f'{name} is {quoted(listed)}; expected a list of at least one value, or '
                 '{first: A, last: B, steps: N}'
             )
     return values
@@ -74,11 +75,11 @@ def _distributions(given: dict[str, Any]) -> dict[str, tuple[str, float, float]]
         ((kind, numbers), *more) = said.items() if isinstance(said, dict) and said else [('', [])]
         two = isinstance(numbers, list) and len(numbers) == 2 and all(map(is_number, numbers))
         if more or not two or kind not in ('normal', 'uniform'):
-            raise ValueError(f'{name} is {said!r}; expected {DISTRIBUTION_WORDS}')
+            raise ValueError(f'{name} is {quoted(said)}; expected {DISTRIBUTION_WORDS}')
         low, high = map(float, numbers)
         # A standard deviation is above 0, the greatest above the lowest.
         if not high > (0.0 if kind == 'normal' else low):
-            raise ValueError(f'{name} is {said!r}; expected {DISTRIBUTION_WORDS}')
+            raise ValueError(f'{name} is {quoted(said)}; expected {DISTRIBUTION_WORDS}')
         found[name] = kind, low, high
     return found
 
@@ -178,7 +179,7 @@ def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[
             raise BatchError(f'{name} varies twice, in two of grid, cases, sample; keep one')
         seen.add(name)
     draws = file.sample.count if file.sample else 1
-    count = int(np.prod([len(v) for v in file.grid.values()])) * max(len(file.cases), 1) * draws
+    count = math.prod(map(len, file.grid.values())) * max(len(file.cases), 1) * draws
     if count > MOST_CASES:
         raise BatchError(f'{count} cases are more than {MOST_CASES}; vary less at once')
     grid = [dict(zip(file.grid, values, strict=True)) for values in product(*file.grid.values())]
@@ -229,7 +230,7 @@ def _require_kind(name: str, value: Any) -> None:
     else:
         holds, expected = is_number(value), 'a number'
     if not holds:
-        raise BatchError(f'{name} is {value!r}; expected {expected}')
+        raise BatchError(f'{name} is {quoted(value)}; expected {expected}')
 
 
 def varied_model(

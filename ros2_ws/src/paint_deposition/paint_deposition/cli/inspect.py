@@ -12,7 +12,7 @@ import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import model_for
 from paint_deposition.cli.results import print_all, progress
-from paint_deposition.errors import some
+from paint_deposition.errors import PaintError, some
 from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
 from paint_deposition.request import MotionOptions, validate
@@ -65,6 +65,9 @@ def inspect_command(
     elif points_file:
         raise click.UsageError('--points is for gauge readings; leave it or --mesh out')
     else:
+        # A picture says what drew it.
+        if output and output.is_file() and b'Matplotlib' not in output.read_bytes():
+            raise PaintError(f'{output} was not drawn by paint; choose another --output')
         with progress('inspect') as show:
             show('reading')
             poses = pd.read_recording(recording, **motion)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from threading import Event, Thread
@@ -130,8 +131,8 @@ def results_options(what: str, default: str | None = None) -> Decorator:
         'all results are complete.'
     )
     each = {
-        'output': click.option('-o', '--output', type=FOLDER, required=default is None,
-                               default=default, help=text),
+        'output': click.option('-o', '--output', type=FOLDER, help=text,
+                               **({'default': default} if default else {'required': True})),
         'pictures': click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']),
                                  default='png', show_default=True, help='Format of the pictures.'),
         'as_json': JSON,
@@ -155,8 +156,9 @@ def zone_lines(
         )
 
 
-# In every folder of results: the files that the last command wrote there, one a line.
-MARKER = '.paint_results'
+# In every folder of results: the files that the last command wrote there, each with its digest;
+# and while a command writes, its work.
+MARKER, WORK = '.paint_results', '.paint_work'
 
 
 @contextmanager
@@ -165,91 +167,118 @@ def results_in(folder: Path) -> Iterator[Path]:
 
     What an earlier command wrote there is removed; other files stay. Work that fails or is
     interrupted leaves the folder as it was; what a killed command left is put right first. Another
-    command waits until this one has written.
+    command waits until this one has written, whoever gives it and from whichever container.
 
     Raises:
         PaintError: what no command wrote has the name of a result, or lies among former results.
     """
-    from filelock import FileLock
-
     folder = folder.resolve()
-    # In the temporary folder of this machine, since its file stays.
-    key = hashlib.sha256(f'{Path.home()} {folder}'.encode()).hexdigest()[:16]
-    with FileLock(Path(tempfile.gettempdir()) / f'paint-{key}.lock', mode=0o600):
-        names = (f'.{folder.name}.paint_{what}' for what in ('work', 'former'))
-        work, former = map(folder.with_name, names)
-        _put_right(folder, work, former)
-        made = [parent for parent in folder.parents if not parent.exists()]
-        work.mkdir(parents=True)
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    with ExitStack() as stack:
+        while True:
+            folder.mkdir(parents=True, exist_ok=True)
+            try:
+                import fcntl
+
+                lock = os.open(folder, os.O_RDONLY)
+                stack.callback(os.close, lock)
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            except (ImportError, OSError):  # a system or a disk without such locks
+                from filelock import FileLock
+
+                key = hashlib.sha256(str(folder).encode()).hexdigest()[:16]
+                file = Path(tempfile.gettempdir()) / f'paint-{key}.lock'
+                stack.enter_context(FileLock(file, mode=0o600))
+                break
+            if folder.exists() and os.path.samestat(os.fstat(lock), folder.stat()):
+                break  # and not the one that a command has removed meanwhile
+        work = folder / WORK
         try:
-            yield work
-            _replace(folder, work, former)
+            _put_right(folder, work)
+            work.mkdir()
+            (work / MARKER).touch()
+            (work / 'new').mkdir()
+            yield work / 'new'
+            _replace(folder, work)
         finally:
-            _put_right(folder, work, former)
+            _put_right(folder, work)
             with suppress(OSError):  # it is not empty any more
-                for parent in made:
-                    parent.rmdir()
+                for path in made:
+                    path.rmdir()
 
 
-def _replace(folder: Path, work: Path, former: Path) -> None:
+def _replace(folder: Path, work: Path) -> None:
     """Put the former results aside and the new in, each file by a rename."""
-    old, new = _written(folder), _files_below(work)
-    present = {path.name for path in folder.iterdir()} if folder.exists() else set()
-    ours = _tops(old | new)
-    for name in sorted(ours & present):
+    from paint_deposition.files.provenance import sha256
+
+    former, new = work / 'former', work / 'new'
+    fresh = {name: sha256(new / name) for name in _files_below(new)}
+    places = ((folder / name, name, digest) for name, digest in _written(folder).items())
+    files = (one for one in places if one[0].is_file() and not one[0].is_symlink())
+    old = {name: digest for path, name, digest in files if sha256(path) == digest}
+    ours = _tops({*old, *fresh}) & {path.name for path in folder.iterdir()}
+    for name in sorted(ours):
         path = folder / name
         held = {f'{name}/{file}' for file in _files_below(path)} if _is_tree(path) else {name}
-        for strange in sorted(held - old):
+        for strange in sorted(held - {*old}):
             raise PaintError(
-                f'{folder / strange} was not written by paint; move it away, or choose '
-                'another --output'
+                f'{folder / strange} was not written by paint, or was changed since; move it '
+                'away, or choose another --output'
             )
-    if not folder.exists():
-        _mark(work, work, new)
-        work.rename(folder)
-        return
-    _mark(work, folder, old | new)
     former.mkdir()
     _mark(work, former, old)
-    for name in sorted(ours & present):
+    _mark(work, folder, old | fresh)
+    for name in sorted(ours):
         (folder / name).rename(former / name)
-    for path in sorted(work.iterdir()):
+    for path in sorted(new.iterdir()):
         path.rename(folder / path.name)
-    former.rename(work / 'former')  # from here on the new results count
-    _mark(work, folder, new)
+    former.rename(work / 'replaced')  # from here on the new results count
+    _mark(work, folder, fresh)
 
 
-def _put_right(folder: Path, work: Path, former: Path) -> None:
+def _put_right(folder: Path, work: Path) -> None:
     """Bring back former results unless the new ones count, and remove the rest."""
-    if _is_tree(work) and (former / MARKER).is_file():
-        old = _tops(_written(former))
-        for name in _tops(_written(folder)):
+    if not os.path.lexists(work):
+        return
+    if not _is_tree(work) or (any(work.iterdir()) and not (work / MARKER).is_file()):
+        raise PaintError(f'{work} was not written by paint; move it away')
+    former = work / 'former'
+    if (former / MARKER).is_file():
+        old = _tops({*_written(former)})
+        for name in _tops({*_written(folder)}):
             is_new = name not in old or (former / name).exists()
             if is_new and (folder / name).exists():
-                (folder / name).rename(work / name)
-        for path in sorted(former.iterdir(), reverse=True):  # its marker last
+                (folder / name).rename(work / 'new' / name)
+        for path in sorted(former.iterdir(), key=lambda path: path.name == MARKER):  # it last
             path.replace(folder / path.name)
-    for path in (former, work):
-        if _is_tree(path):
-            shutil.rmtree(path)
+        if not _written(folder):
+            (folder / MARKER).unlink()
+    for path in sorted(work.iterdir(), key=lambda path: path.name == MARKER):
+        shutil.rmtree(path) if _is_tree(path) else path.unlink()
+    work.rmdir()
 
 
-def _mark(work: Path, folder: Path, files: set[str]) -> None:
+def _mark(work: Path, folder: Path, files: Mapping[str, str]) -> None:
     """Name the files in the marker of a folder, by way of the work folder."""
     copy = work / f'{MARKER}_copy'
-    write_text(copy, ''.join(f'{name}\n' for name in sorted(files)))
+    write_text(copy, ''.join(f'{files[name]}  {name}\n' for name in sorted(files)))
     copy.replace(folder / MARKER)
 
 
-def _written(folder: Path) -> set[str]:
-    """The files that the marker of a folder names, which anyone can edit: those in it only."""
+def _written(folder: Path) -> dict[str, str]:
+    """The files that the marker of a folder names, those in it only, and their digests.
+
+    Anyone can edit it: who wants a file removed has to know what is in it.
+    """
     marker = folder / MARKER
     text = marker.read_text(encoding='utf-8', errors='replace') if marker.is_file() else ''
-    paths = map(PurePosixPath, filter(str.isprintable, text.splitlines()))
-    plain = (
-        p for p in paths if p.parts and not p.is_absolute() and not {'..', MARKER} & {*p.parts}
-    )
-    return set(map(str, plain))
+    found = {}
+    for digest, _, name in (line.partition('  ') for line in text.splitlines()):
+        path = PurePosixPath(name)
+        strange = path.is_absolute() or {'..', MARKER, WORK} & {*path.parts}
+        if path.parts and not strange and name.isprintable():
+            found[str(path)] = digest
+    return found
 
 
 def _tops(files: set[str]) -> set[str]:

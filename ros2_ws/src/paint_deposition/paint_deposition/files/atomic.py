@@ -6,9 +6,6 @@ Texts, YAML, JSON that every reader takes (no NaN), Parquet tables, and texts by
 from __future__ import annotations
 
 import os
-import re
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,54 +14,37 @@ from uuid import uuid4
 
 from pydantic_core import to_json, to_jsonable_python
 
-from paint_deposition.errors import LONGEST_QUOTED, PaintError
+from paint_deposition.errors import LONGEST_REASON, PaintError, shortened
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 # Of a file that is read as a whole [MB]: more is no mesh or table of this trade, or would fill the
-# memory. Of a text that a person edits.
-MOST_MB, MOST_TEXT_MB = 2000, 20
-MOST_EXPANDED_BYTES, BLOCK_BYTES = 1_000_000_000, 1 << 20
-# Levels of a YAML document, and its values with each alias in full.
-MOST_LEVELS, MOST_VALUES = 500, 100_000
+# memory. Of a text that a person edits, and of YAML, which takes 10 s and 70 MB for each MB.
+MOST_MB, MOST_TEXT_MB, MOST_YAML_MB = 2000, 20, 2
+BLOCK_BYTES = 1 << 20
+# Levels of a YAML document, and letters and values that its aliases stand for.
+MOST_LEVELS, MOST_REPEATED = 500, 500_000
 
 
-def require_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> None:
-    """Raise ``refusal`` for what is there and is no regular file or folder, or is too large.
+def require_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> Path:
+    """The path; raise ``refusal`` for what is there and is no regular file, or is too large.
 
     A device or a pipe would be read for ever.
     """
     path = Path(path)
     if not path.exists() or path.is_dir():
-        return  # whoever reads it says so
+        return path  # whoever reads it says so
     if not path.is_file():
         raise refusal(f'{path} is a device or a pipe; give a file')
     if (size_mb := path.stat().st_size / 1e6) > most_mb:
         raise refusal(f'{path} has {size_mb:.0f} MB; give a file of {most_mb:g} MB at most')
-
-
-def require_small_package(package: zipfile.ZipFile) -> None:
-    """Raise BadZipFile for one that is too large when it is expanded, or says it is smaller."""
-    left = MOST_EXPANDED_BYTES
-    for member in package.infolist():
-        left -= member.file_size
-        if left < 0:
-            raise zipfile.BadZipFile(f'it holds over {MOST_EXPANDED_BYTES / 1e6:g} MB, expanded')
-        try:
-            with package.open(member) as content:  # the end is compared with what the head says
-                while content.read(BLOCK_BYTES):
-                    pass
-        except (EOFError, NotImplementedError, RuntimeError, ValueError, zlib.error) as error:
-            raise zipfile.BadZipFile(
-                f'{member.filename}: {str(error) or "it breaks off"}'
-            ) from None
+    return path
 
 
 def read_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> bytes:
     """The content of a file that ``require_file`` takes. Raises OSError as Path.read_bytes."""
-    require_file(path, refusal, most_mb)
-    return Path(path).read_bytes()
+    return require_file(path, refusal, most_mb).read_bytes()
 
 
 def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
@@ -73,66 +53,79 @@ def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
     It is YAML 1.2 in which a key may not be given twice. Raises ``refusal`` where the file cannot
     be read or is none.
     """
-    from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
 
     try:
-        text = read_file(path, refusal, MOST_TEXT_MB).decode('utf-8')
-        require_small(text)
-        return YAML(typ='safe', pure=True).load(text)
+        text = read_file(path, refusal, MOST_YAML_MB).decode('utf-8')
     except FileNotFoundError:
         raise refusal(f'{path}: no such file; give a {kind} YAML') from None
     except OSError as error:
         raise refusal(f'{path}: cannot be read ({error.strerror})') from None
-    except (RecursionError, OverflowError):
-        raise refusal(
-            f'{path}: its values are nested too deeply, or too many by aliases; give a {kind} YAML'
-        ) from None
     except UnicodeDecodeError:
         raise refusal(
             f'{path}: is no text, such as a workbook or a bag; give a {kind} YAML in UTF-8'
         ) from None
-    except ValueError as error:  # a date that is none
+    try:
+        return load_yaml(text)
+    except (RecursionError, OverflowError):
         raise refusal(
-            f'{path}: cannot be read as YAML ({error}); put such a value in quotes'
+            f'{path}: its values are nested too deeply, or too many by aliases; give a {kind} YAML'
         ) from None
     except YAMLError as error:
-        mark, problem = getattr(error, 'problem_mark', None), ' '.join(str(error).split())
+        mark, problem = getattr(error, 'problem_mark', None), str(error)
         if mark is not None:
             problem = str(getattr(error, 'problem', error)).split(' with value')[0]
-            problem = f'line {mark.line + 1}: {problem[:LONGEST_QUOTED]}'
-        raise refusal(f'{path}: cannot be read as YAML ({problem})') from None
+            problem = f'line {mark.line + 1}: {problem}'
+        raise refusal(
+            f'{path}: cannot be read as YAML ({shortened(problem, LONGEST_REASON)})'
+        ) from None
+    except Exception as error:  # whatever a date or a number that is none provokes
+        raise refusal(
+            f'{path}: cannot be read as YAML ({shortened(str(error))}); put such a value in '
+            'quotes, without tags and escapes'
+        ) from None
 
 
-def require_small(text: str) -> None:
-    """Refuse YAML that nests, or of which aliases make, more than any file of the trade has.
+def load_yaml(text: str) -> Any:
+    """The one document of a text of YAML 1.2, of no more than a file of the trade has.
 
-    Raises OverflowError, or what the text itself provokes. Parsers written in C would end the
-    process; a few hundred bytes of aliases could stand for gigabytes.
+    Raises OverflowError where it nests too deeply or aliases stand for too much, and whatever the
+    text provokes. Parsers written in C would end the process; a few hundred bytes of aliases could
+    stand for gigabytes.
     """
-    depth = 0
-    for mark in re.findall(r'[\[{}\]]', text):
-        depth = max(depth + (1 if mark in '[{' else -1), 0)
-        if depth > MOST_LEVELS:
-            raise OverflowError('brackets')
-    if max(map(len, re.findall(r'^[ \t?:-]*', text, re.MULTILINE)), default=0) > MOST_LEVELS:
-        raise OverflowError('indentation')
-    if re.search(r'(^|[\s\[{,])\*', text):
-        from ruamel.yaml import YAML
+    from ruamel.yaml import YAML, events
 
-        _size(YAML(typ='safe', pure=True).compose(text), {})
+    constructor, parser = YAML(typ='safe', pure=True).get_constructor_parser(text)
+    take, size, repeated = parser.get_event, 0, 0
+    opened: list[tuple[Any, int]] = []  # the anchors of the levels, and the size before each
+    sizes: dict[Any, int] = {}  # of what has an anchor, with each alias in it in full
 
+    def counted() -> Any:
+        nonlocal size, repeated
+        event = take()
+        name, before = getattr(event, 'anchor', None), size
+        match event:
+            case events.CollectionStartEvent():
+                opened.append((name, size))
+                before = size - MOST_REPEATED  # where it is found within itself
+            case events.CollectionEndEvent():
+                name, before = opened.pop()
+                size += 1
+            case events.AliasEvent():
+                size += sizes.get(name, 0)
+                repeated += sizes.get(name, 0)
+            case events.ScalarEvent():
+                size += 1 + len(event.value.encode())
+        if not isinstance(event, events.AliasEvent):
+            sizes[name] = size - before
+        if len(opened) > MOST_LEVELS or repeated >= MOST_REPEATED:
+            raise OverflowError('it nests too deeply, or aliases stand for too much')
+        return event
 
-def _size(node: Any, known: dict[int, int]) -> int:
-    """How many values a node of YAML stands for, each alias in full."""
-    if id(node) not in known:
-        known[id(node)] = MOST_VALUES  # where it is found within itself
-        held = node.value if node and isinstance(node.value, list) else []
-        nodes = (part for one in held for part in (one if isinstance(one, tuple) else (one,)))
-        known[id(node)] = 1 + sum(_size(part, known) for part in nodes)
-    if known[id(node)] >= MOST_VALUES:
-        raise OverflowError('aliases')
-    return known[id(node)]
+    vars(parser)['get_event'] = counted
+    content = constructor.get_single_data()
+    repr(content)  # raises ValueError for a number of thousands of digits
+    return content
 
 
 @contextmanager

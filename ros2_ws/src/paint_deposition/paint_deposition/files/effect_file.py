@@ -20,6 +20,7 @@ from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.errors import ModelError, did_you_mean
+from paint_deposition.files.atomic import MOST_YAML_MB, read_file
 from paint_deposition.kernel.compiler import njit
 from paint_deposition.kernel.eq2_flux import Ray, in_precision
 from paint_deposition.model.eq2_projection import Projection
@@ -82,7 +83,7 @@ def read_effect_file(path: str | Path) -> type[Effect]:
     if path.exists() and not path.is_file():
         raise ModelError(f'{path} is no file; give the file of an effect')
     try:
-        source = path.read_bytes()
+        source = read_file(path, ModelError, MOST_YAML_MB)
     except OSError as error:
         raise ModelError(
             f'{path}: cannot be read ({error.strerror}); give the file of an effect'

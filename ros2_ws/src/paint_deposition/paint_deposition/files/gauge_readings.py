@@ -269,7 +269,7 @@ def table_text(lines: Iterable[Sequence[object]]) -> str:
     """Lines of values as CSV in which no program finds a formula: ' stands before such texts."""
     text = StringIO(newline='')
     writer = csv.writer(text, lineterminator='\n')
-    writer.writerows([f"'{v}" if FORMULA.match(str(v)) else v for v in line] for line in lines)
+    writer.writerows([FORMULA.sub("'", str(v)) for v in line] for line in lines)
     return text.getvalue()
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic_core import from_json
 
-from paint_deposition.errors import MeshError, did_you_mean, some
+from paint_deposition.errors import LONGEST_REASON, MeshError, did_you_mean, shortened, some
 from paint_deposition.files.atomic import replacing, require_file
 from paint_deposition.part.edges import matched_half_edges, weld
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
@@ -30,6 +31,9 @@ STL_TRIANGLE = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('col
 # Vertices (V, 3) in the file's own unit and precision, and faces (F, 3).
 Body = tuple[np.ndarray, np.ndarray]
 LARGEST_M = 50.0
+# Bodies that trimesh makes of a file, of 30 kB each; triangles of bodies that are repeated;
+# vectors and indices in lists of glTF, which may be the same bytes or none.
+MOST_BODIES, MOST_REPEATED, MOST_NUMBERS = 20_000, 5_000_000, 30_000_000
 # Types of a PLY, little-endian.
 PLY = {'float': '<f4', 'uchar': 'u1', 'int': '<i4'}
 
@@ -174,8 +178,13 @@ def read_bodies(path: Path, body: str | None = None) -> tuple[Body, list[str], i
                 raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, [path.stem])}')
             corners = np.fromfile(path, STL_TRIANGLE, offset=STL_HEAD)['corners']
             return (corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3)), [], 1
-    scene = _scene(path, kind)
-    found = _by_name(path, scene)
+    try:
+        found = _by_name(path, _scene(path, kind))
+    except MeshError:
+        raise
+    except Exception as error:  # trimesh's readers raise whatever the broken bytes provoke
+        reason = shortened(str(error), LONGEST_REASON) or type(error).__name__
+        raise MeshError(f'{path}: not readable as a mesh ({reason}); export it again') from error
     if len(found) == 1 and not {*found} & {body}:  # the only one also has the name of its file
         found = {path.stem: next(iter(found.values()))}
     notes = []
@@ -207,23 +216,34 @@ def _scene(path: Path, kind: str) -> Scene:
     import trimesh
 
     options: dict[str, Any] = {'process': False, 'skip_materials': True}
-    if kind in PLAIN:
+    source: Any = str(path)
+    bodies = 0
+    if kind not in ('.step', '.stp'):
         content = path.read_bytes()
         if kind == '.stl' and content and b'facet' not in content:
             raise MeshError(
                 f'{path}: not readable as a mesh, neither a text STL nor, with its {len(content)} '
                 'bytes, a complete binary one; export it again'
             )
-        if kind != '.ply':  # a text with letters of any encoding
+        if kind in ('.stl', '.obj'):  # a text with letters of any encoding
             content = content.decode('utf-8', errors='replace').encode()
-        options |= {'validate': False, 'split_objects': True} if kind == '.obj' else {}
-        source: Any = BytesIO(content)
-    elif kind == '.glb':
+        if kind == '.obj':
+            options |= {'validate': False, 'split_objects': True}
+            content = content.replace(b'\r\n', b'\n').replace(b'\\\n', b'')  # one line each
+            bodies = content.count(b'\no') + content.count(b'usemtl ')
+        if kind in ('.gltf', '.glb'):
+            glb = slice(20, 20 + int.from_bytes(content[12:16], 'little'))
+            head = from_json(content[glb] if kind == '.glb' else content)
+            bodies = sum(len(one['primitives']) for one in head.get('meshes', ()))
+            bodies = max(bodies, len(head.get('nodes', ())))
+            numbers = sum(one['count'] for one in head.get('accessors', ()))
+            if numbers > MOST_NUMBERS:
+                raise MeshError(f'{path}: lists {numbers} numbers; give {MOST_NUMBERS} at most')
+            options['resolver'] = beside = trimesh.resolvers.FilePathResolver(str(path))
+            place = beside.absolute
+            vars(beside)['absolute'] = lambda name: require_file(place(name), MeshError)
         # A file would be read for as many bytes at once as its head claims.
-        source = BytesIO(path.read_bytes())
-        options['resolver'] = trimesh.resolvers.FilePathResolver(str(path))
-    else:
-        source = str(path)
+        source = BytesIO(content)
     if kind in ('.step', '.stp'):
         if importlib.util.find_spec(STEP_READER) is None:
             raise MeshError(
@@ -233,21 +253,26 @@ def _scene(path: Path, kind: str) -> Scene:
         # How finely its surfaces are cut [mm, rad]: the film is then off by less than 1 % on folds
         # of 10 mm and more.
         options |= {'tol_linear': 0.1, 'tol_angular': 0.15}
-    try:
-        return trimesh.load_scene(source, file_type=kind[1:], **options)
-    except Exception as error:  # trimesh's readers raise whatever the broken bytes provoke
-        reason = (str(error).strip() or type(error).__name__).splitlines()[0][:120]
-        raise MeshError(f'{path}: not readable as a mesh ({reason}); export it again') from error
+    if bodies > MOST_BODIES:
+        raise MeshError(
+            f'{path}: has {bodies} bodies, over {MOST_BODIES}; join them, or export fewer'
+        )
+    return trimesh.load_scene(source, file_type=kind[1:], **options)
 
 
 def _by_name(path: Path, scene: Scene) -> dict[str, Body]:
     """Each body with triangles, placed as in the file."""
     found: dict[str, Body] = {}
+    placed, repeated = set(), 0
     for node in scene.graph.nodes_geometry:
         pose, name = scene.graph[node]
         faces = getattr(scene.geometry[name], 'faces', None)
         if faces is None or not len(faces):
             continue
+        repeated += len(faces) if name in placed else 0
+        if repeated > MOST_REPEATED:
+            raise MeshError(f'{path}: repeats bodies of over {MOST_REPEATED} triangles; use fewer')
+        placed.add(name)
         vertices: np.ndarray = np.asarray(scene.geometry[name].vertices, dtype=np.float64)
         if vertices.shape[1:] != (3,):
             raise MeshError(f'{path}: the vertices of {name!r} have no x, y, z; export it again')

@@ -13,6 +13,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory
 from paint_deposition.request import POSE_FORMAT, is_pose
 
+LONGEST_S = 8 * 3600.0
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
 
 
@@ -86,6 +87,11 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
             raise RecordingError(
                 f'line {move.line}: a move of {length_m:g} m at {move.speed_m_per_s:g} m/s takes '
                 f'{duration_s / 3600.0:.3g} h; check its target and speed'
+            )
+        if times_s[-1] > LONGEST_S:
+            raise RecordingError(
+                f'line {move.line}: the program runs for over {LONGEST_S / 3600.0:g} h; check its '
+                'loops and speeds'
             )
         switches = [
             (share, one.on, move.brush if one.brush is None else one.brush)

@@ -5,8 +5,7 @@ RAPID ignores case: all is converted to lower case.
 
 import json
 from dataclasses import dataclass, replace
-from functools import cache
-from pathlib import Path
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer, Tree, UnexpectedInput, v_args
@@ -136,10 +135,9 @@ def name_of(node: object) -> str:
     return str(node.children[0]) if isinstance(node, Tree) and node.data == 'reference' else ''
 
 
-@cache
-def _grammar() -> Lark:
-    text = Path(__file__).with_name('rapid.lark').read_text(encoding='utf-8')
-    return Lark(text, parser='lalr', transformer=_Builder())
+_grammar = cache(
+    partial(Lark.open, 'rapid.lark', rel_to=__file__, parser='lalr', transformer=_Builder())
+)
 
 
 def parse_modules(text: str, source: str) -> list[Module]:

@@ -264,7 +264,7 @@ class Values:
 
     def _calculated(self, name: str, function: Any, values: list, **named: Any) -> Any:
         try:
-            result = function(*values, **named)
+            result = function(*self._copied(values), **named)
             if isinstance(result, str) and len(result) > MOST_LETTERS:
                 self.fail(f'a string of {len(result)} letters; RAPID has {MOST_LETTERS} at most')
             return result

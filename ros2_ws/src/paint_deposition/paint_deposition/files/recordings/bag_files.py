@@ -19,7 +19,6 @@ from types import SimpleNamespace
 from typing import Any, BinaryIO, NamedTuple
 
 import lz4.frame
-import yaml
 import zstandard
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC
@@ -27,13 +26,15 @@ from rosbags.interfaces import MessageDefinitionFormat, Nodetype
 from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag1 import reader as ros1_reader
 from rosbags.rosbag2 import Reader as Ros2Reader
+from rosbags.rosbag2 import metadata as ros2_metadata
 from rosbags.rosbag2 import reader as ros2_reader
 from rosbags.rosbag2 import storage_mcap
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
+from ruamel.yaml import YAML
 
-from paint_deposition.errors import RecordingError
-from paint_deposition.files.atomic import MOST_TEXT_MB, read_file, require_file, require_small
+from paint_deposition.errors import LONGEST_REASON, RecordingError, shortened
+from paint_deposition.files.atomic import MOST_YAML_MB, load_yaml, read_file, require_file
 from paint_deposition.files.recordings import messages as definitions
 
 # The key under which the custom data of a plan's bag names its trigger topic.
@@ -220,7 +221,11 @@ def _small_file(file: BinaryIO, mode: str) -> Iterator[Any]:
     yield SimpleNamespace(read=read)
 
 
-# rosbags expands chunks, messages and files to any size.
+# rosbags expands chunks, messages and files to any size, and reads YAML by a parser in C.
+for of_rosbags in (ros2_metadata, ros2_reader):
+    vars(of_rosbags)['YAML'] = lambda **kind: SimpleNamespace(
+        load=load_yaml, dump=YAML(**kind).dump
+    )
 vars(ros2_reader)['zstd'] = SimpleNamespace(open=_small_file, decompress=partial(_small, 'zstd'))
 storage_mcap.DECOMPRESSORS.update({c: partial(_small, c) for c in ('lz4', 'zstd')})
 ros1_reader.decompressors.update({c: partial(_small, c) for c in ('lz4', 'bz2')})
@@ -240,8 +245,7 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
     _require_bag(path)
     with _read_errors(path):
         if (path / 'metadata.yaml').is_file():
-            metadata = read_file(path / 'metadata.yaml', RecordingError, MOST_TEXT_MB)
-            require_small(metadata.decode('utf-8'))
+            require_file(path / 'metadata.yaml', RecordingError, MOST_YAML_MB)
         reader = Ros1Reader(path) if path.suffix == '.bag' else Ros2Reader(path)
         reader.open()
     try:
@@ -264,9 +268,8 @@ def _metadata(path: Path) -> tuple[dict[str, str], list[str] | None]:
     """
     folder = path if path.is_dir() else path.parent
     try:
-        text = read_file(folder / 'metadata.yaml', RecordingError, MOST_TEXT_MB).decode('utf-8')
-        require_small(text)
-        metadata = yaml.load(text, Loader=getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
+        text = read_file(folder / 'metadata.yaml', RecordingError, MOST_YAML_MB).decode('utf-8')
+        metadata = load_yaml(text)
         told = dict(metadata['rosbag2_bagfile_information'])
     except Exception:  # damaged, or no bag, which reading it reports
         return {}, None
@@ -344,7 +347,9 @@ def _read_errors(path: Path) -> Iterator[None]:
     except OSError as error:
         raise RecordingError(f'cannot read {path}: {error.strerror or error}') from None
     except Exception as error:
-        reason = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
+        reason = shortened(str(error), LONGEST_REASON).rstrip('.') or type(error).__name__
+        if isinstance(error, MemoryError):
+            reason = 'a record claims more than there is memory'
         raise RecordingError(f'{path} is damaged ({reason}){_remedy(path)}') from None
 
 

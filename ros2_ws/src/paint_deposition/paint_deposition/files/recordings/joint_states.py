@@ -12,7 +12,7 @@ import networkx as nx
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.errors import RecordingError, did_you_mean, quoted
+from paint_deposition.errors import RecordingError, did_you_mean, quoted, some
 from paint_deposition.files.atomic import MOST_TEXT_MB, read_file
 from paint_deposition.files.recordings.bag_files import Bag, listed_topics
 from paint_deposition.files.recordings.messages import JOINT_TYPE, joint_streams
@@ -73,7 +73,7 @@ class Robot:
         parents.add_nodes_from(link.name for link in links)
         last = sorted(link for link in parents if not parents.in_degree(link))
         if tip is None and DEFAULT_TIP not in parents and len(last) != 1:
-            raise RecordingError(f'{path} ends in {" ".join(last)}; name one as tip_link')
+            raise RecordingError(f'{path} ends in {some(last, 20)}; name one as tip_link')
         tip = tip or (DEFAULT_TIP if DEFAULT_TIP in parents else last[0])
         base = base or next((link for link in parents if not parents.out_degree(link)), '')
         for name in (tip, base):
@@ -116,8 +116,8 @@ class Robot:
         missing = [joint for joint in self.arm.joints if joint not in found]
         if missing or not found:
             raise RecordingError(
-                f'{where} has nothing of {" ".join(missing) or "any joint"} of {self.path.name}; '
-                f'its joints: {" ".join(sorted(names)) or "none"}; where they have a prefix, give '
+                f'{where} has nothing of {some(missing, 20) or "any joint"} of {self.path.name}; '
+                f'its joints: {some(sorted(names), 20) or "none"}; where they have a prefix, give '
                 '--joint-prefix'
             )
         return found

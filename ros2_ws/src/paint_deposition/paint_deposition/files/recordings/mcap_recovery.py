@@ -11,7 +11,6 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import IO, Any, cast
 
-import yaml
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError, RecordLengthLimitExceeded
@@ -24,7 +23,7 @@ from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.metadata import parse_qos
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.atomic import require_file, require_small
+from paint_deposition.files.atomic import load_yaml, require_file
 from paint_deposition.files.recordings.bag_files import MOST_CHUNK_BYTES, expanded, mcap_files
 from paint_deposition.files.recordings.mcap_run import RunWriter
 
@@ -94,8 +93,7 @@ def _copy(file: Path, run: RunWriter, lost: Lost, on_bytes: Callable[[int], None
             # An older record, or none, has to do where this one is damaged.
             with suppress(Exception):
                 text = record.metadata.get('serialized_metadata', '')
-                require_small(text)
-                content = yaml.safe_load(text)
+                content = load_yaml(text)
                 custom = content.get('custom_data') or {}
                 run.custom_data = {key: str(value) for key, value in custom.items()}
                 run.ros_distro = content.get('ros_distro') or run.ros_distro

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.errors import RecordingError
+from paint_deposition.errors import RecordingError, quoted
 from paint_deposition.files.tables.headings import (
     ANGLES,
     BESIDE,
@@ -47,7 +47,7 @@ def read_columns(path: Path, robot: 'Robot | None' = None) -> Table:
     known = partial(_known, robot=robot)
     sheet, header = find_table(path, RecordingError, known, several=alone)
     if header is None:
-        first = ', '.join(map(text_of, sheet.rows[0])) if sheet.rows else 'none'
+        first = quoted(', '.join(map(text_of, sheet.rows[0]))) if sheet.rows else 'none'
         if robot is not None and sheet.rows:
             robot.recorded_joints(_by_text(headings_in(sheet.rows[0])), str(path), True)
         raise RecordingError(

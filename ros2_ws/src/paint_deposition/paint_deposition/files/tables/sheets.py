@@ -1,28 +1,40 @@
 """Sheets of cells, from text files of any usual encoding and separator and from workbooks."""
 
 import csv
-import json
 import re
 import zipfile
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from io import BytesIO, StringIO
+from itertools import chain
 from pathlib import Path
+from xml.parsers import expat
 
-from paint_deposition.errors import PaintError, some
-from paint_deposition.files.atomic import read_file, require_small_package
+from pydantic_core import from_json
+
+from paint_deposition.errors import LONGEST_REASON, PaintError, shortened, some
+from paint_deposition.files.atomic import read_file
 from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES, NOTHING
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
 
 WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
-MOST_TABLE_MB = 500
-# The place of a cell, of a row, or of the end of the table.
-XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]*)(\d+)["\']')
-# What a spreadsheet would take for a formula, and no number: written with a ' before it.
-FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
+MOST_TABLE_MB = 150
+# Of a table; a million rows take 1.2 GB and 40 s.
+MOST_ROWS, MOST_COLUMNS, MOST_CELLS = 1_200_000, 16_384, 10_000_000
+LINE_BREAK = re.compile(r'\r\n|[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]')
+# Of a workbook: its package when it is expanded, and the letters of all its cells.
+MOST_EXPANDED_BYTES, MOST_LETTERS = 300_000_000, 300_000_000
+DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError)
+FAR = 'a workbook (delete what lies far outside the table)'
+# Before what a spreadsheet would take for a formula, and no number, a ' is written: where a cell
+# begins, also where a semicolon may part two.
+FORMULA_BEGINS = r'(?=[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?(;|$)))'
+FORMULA, DISARMED = (
+    re.compile(rf'(?<![^;]){mark}{FORMULA_BEGINS}', re.IGNORECASE) for mark in ('', "'")
+)
 EXPECTED = 'give a table as CSV, TSV, TXT or JSON, or a workbook (.xlsx, .xls)'
 
 
@@ -40,9 +52,16 @@ class Sheet:
 
     @staticmethod
     def of(numbered: Iterable[tuple[int, list[Cell]]], form: str) -> 'Sheet':
-        """The rows that are not blank."""
-        kept = [(line, row) for line, row in numbered if any(cell != '' for cell in row)]
-        return Sheet([row for _, row in kept], [line for line, _ in kept], form)
+        """The rows that are not blank. Raises ValueError for too many cells."""
+        sheet, cells = Sheet([], [], form), 0
+        for line, row in numbered:
+            cells += len(row)
+            if cells > MOST_CELLS or len(row) > MOST_COLUMNS:
+                raise ValueError(f'a table ({form}: over {MOST_COLUMNS} columns, or too large)')
+            if any(cell != '' for cell in row):
+                sheet.rows.append(row)
+                sheet.lines.append(line)
+        return sheet
 
 
 def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
@@ -73,8 +92,8 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
         if records := _records(texts[0][0]):
             return [records]
         return [sheet for text, encoding in texts for sheet in _sheets_of_text(text, encoding)]
-    except ValueError as error:
-        reason = ' '.join(str(error).split())
+    except (ValueError, OverflowError) as error:  # a number of hundreds of digits
+        reason = shortened(str(error), LONGEST_REASON)
         raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
 
 
@@ -106,8 +125,8 @@ def _decoded(content: bytes) -> list[tuple[str, str]]:
 def _records(text: str) -> Sheet | None:
     """The first list of records in JSON as a table, what stands beside it above; else None."""
     try:
-        found = json.loads(text, parse_int=float) if text.lstrip()[:1] in ('[', '{') else None
-    except (ValueError, RecursionError):
+        found = from_json(text) if text.lstrip()[:1] in ('[', '{') else None
+    except ValueError:
         return None
     above: list[list[Cell]] = []
     while isinstance(found, dict):
@@ -117,11 +136,13 @@ def _records(text: str) -> Sheet | None:
     if not records:
         return None
     keys = list(dict.fromkeys(key for record in records for key in record))
-    rows = [[_cell(record.get(key)) for key in keys] for record in records]
-    return Sheet.of(enumerate([*above, [*map(_cell, keys)], *rows], 1), 'JSON')
+    rows = ([_cell(record.get(key)) for key in keys] for record in records)
+    return Sheet.of(enumerate(chain(above, [[*map(_cell, keys)]], rows), 1), 'JSON')
 
 
 def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
+    if sum(1 for _ in LINE_BREAK.finditer(text)) > MOST_ROWS:
+        raise ValueError(f'a table (over {MOST_ROWS} lines; split it)')
     sheets = []
     separators = {'\t': 'tabs', ';': 'semicolons', '|': 'bars', ',': 'commas'}
     for mark, name in separators.items():
@@ -149,39 +170,73 @@ def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
 
 
 def _sheets_of_workbook(content: bytes) -> list[Sheet]:
-    """The sheets, unless a stray cell far away would fill the memory."""
     from python_calamine import CalamineError, CalamineWorkbook
 
-    cells = 0
     try:
-        if zipfile.is_zipfile(BytesIO(content)):
+        if content.startswith(WORKBOOKS[0]):
             with zipfile.ZipFile(BytesIO(content)) as package:
-                require_small_package(package)
-                for name in package.namelist():
-                    if name == 'content.xml':
-                        raise ValueError('a workbook (an .ods; save it as .xlsx)')
-                    if name.startswith('xl/') and name.endswith('.xml'):
-                        cells = max(cells, _most_cells(package.read(name)))
-        if cells > 10_000_000:  # the reader keeps all up to the last one, some 30 bytes each
-            raise ValueError('a workbook (delete what lies far outside the table)')
+                _require_small(package)
         workbook = CalamineWorkbook.from_filelike(BytesIO(content))
-        sheets = []
+        sheets, left = [], MOST_CELLS
         for sheet in map(workbook.get_sheet_by_name, workbook.sheet_names):
+            if (left := left - sheet.total_height * sheet.total_width) < 0:
+                raise ValueError(FAR)
             rows = ([_cell(value) for value in row] for row in sheet.to_python(False))
             sheets.append(Sheet.of(enumerate(rows, 1), f"sheet '{sheet.name}'"))
         return sheets
-    except (CalamineError, zipfile.BadZipFile, zlib.error, RuntimeError, OSError) as error:
+    except (CalamineError, *DAMAGE) as error:
         raise ValueError(f'a workbook ({error})') from None
 
 
-def _most_cells(xml: bytes) -> int:
-    """The cells up to the last place that is named in a sheet of an .xlsx."""
-    places = set(XLSX_CELL.findall(xml))
-    # As many letters and digits as make any sheet too large.
-    names = (column[:7][::-1] for column, _ in places)
-    widths = (sum(26**k * (c & 31) for k, c in enumerate(name)) for name in names)
-    rows = (int(row) if len(row) < 10 else 10**9 for _, row in places)
-    return max(widths, default=0) * max(rows, default=0)
+def _require_small(package: zipfile.ZipFile) -> None:
+    """Raise ValueError for an .xlsx whose cells or texts would fill the memory.
+
+    calamine keeps all cells up to the last one, some 30 bytes each, and the text of each. A sheet
+    may have any name in the package.
+    """
+    names = {name.lower() for name in package.namelist()}
+    if 'xl/workbook.xml' not in names or names & {'xl/workbook.bin', 'content.xml'}:
+        raise ValueError('a workbook (an .ods or .xlsb; save it as .xlsx)')
+    texts, left, cells, strings = [0], MOST_EXPANDED_BYTES, 0, 0
+    row = column = height = width = 0
+    letters: set[str] = set()
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal cells, strings, row, column, height, width
+        kind, place = tag.rpartition(':')[2], attributes.get('r', '')
+        if kind == 'si':
+            texts.append(0)
+        elif kind == 'row':
+            row, column = int(place or row + 1), 0
+        elif kind == 'c':
+            cells, column = cells + 1, column + (not place)
+            strings += attributes.get('t') == 's'
+            name = place.rstrip('0123456789')
+            letters.add(name[:7])
+            height, width = max(height, row, int(place[len(name) :] or 0)), max(width, column)
+            if cells > MOST_CELLS:
+                raise ValueError(FAR)
+
+    for member in package.infolist():
+        row = height = width = 0
+        letters.clear()
+        parser = expat.ParserCreate()
+        parser.StartElementHandler = begin
+        if is_texts := member.filename.lower() == 'xl/sharedstrings.xml':
+            parser.CharacterDataHandler = lambda text: texts.append(texts.pop() + len(text))
+        if (left := left - member.file_size) < 0:
+            raise ValueError(f'a workbook (over {MOST_EXPANDED_BYTES / 1e6:g} MB, expanded)')
+        try:
+            with package.open(member) as content:  # the end is compared with what the head says
+                parser.ParseFile(content)
+        except expat.ExpatError as error:  # a picture, for instance
+            if is_texts or b'sheetData' in package.read(member):
+                raise ValueError(f'a workbook ({member.filename}: {error})') from None
+        named = (sum(26**k * (ord(c) & 31) for k, c in enumerate(n[::-1])) for n in letters)
+        if height * (max(named, default=0) + width) > MOST_CELLS:
+            raise ValueError(FAR)
+    if strings * max(texts) > MOST_LETTERS:
+        raise ValueError(f'a workbook (a text of {max(texts)} letters; shorten it)')
 
 
 def _cell(value: object) -> Cell:
@@ -191,7 +246,7 @@ def _cell(value: object) -> Cell:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     text = ' '.join(str(value).strip().splitlines())
-    return text[1:].strip() if text[:1] == "'" and FORMULA.match(text[1:]) else text
+    return DISARMED.sub('', text).strip() if "'" in text else text
 
 
 def cell_at(row: list[Cell], column: int) -> Cell:
