@@ -20,7 +20,7 @@ from tqdm import tqdm
 import paint_deposition as pd
 from paint_deposition.cli.options import FOLDER, JSON, Decorator, option_group
 from paint_deposition.errors import PaintError
-from paint_deposition.files.atomic import write_text
+from paint_deposition.files.atomic import WORK, write_text
 
 if TYPE_CHECKING:
     from paint_deposition.film.statistics import FilmStatistics
@@ -156,9 +156,8 @@ def zone_lines(
         )
 
 
-# In every folder of results: the files that the last command wrote there, each with its digest;
-# and while a command writes, its work.
-MARKER, WORK = '.paint_results', '.paint_work'
+# In every folder of results: the files that the last command wrote there, each with its digest.
+MARKER = '.paint_results'
 
 
 @contextmanager

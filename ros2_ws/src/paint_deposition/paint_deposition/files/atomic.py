@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 # memory. Of a text that a person edits, and of YAML, which takes 10 s and 70 MB for each MB.
 MOST_MB, MOST_TEXT_MB, MOST_YAML_MB = 2000, 20, 2
 BLOCK_BYTES = 1 << 20
+# In a folder of results, while they are written: the folder `new` in it holds them.
+WORK = '.paint_work'
 # Levels of a YAML document, and letters and values that its aliases stand for.
 MOST_LEVELS, MOST_REPEATED = 500, 500_000
 

@@ -18,7 +18,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError, quoted
-from paint_deposition.files.atomic import plain, read_yaml, write_text
+from paint_deposition.files.atomic import WORK, plain, read_yaml, write_text
 from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.inference.fitting.parameters import Posterior
 from paint_deposition.model.eq1_pattern import MOST, Brush, BrushEntry, PlanarPattern
@@ -269,8 +269,12 @@ def _effect_text(effect: Effect, folder: Path) -> CommentedMap:
     source, name = 'id', effect.id
     if effect.file:
         source, name = 'file', effect.file.as_posix()
+        parts = folder.resolve().parts
+        if WORK in parts:  # results that are being written, and will be two levels above
+            at = parts.index(WORK)
+            parts = (*parts[:at], *parts[at + 2 :])
         with suppress(ValueError):  # on another drive
-            name = Path(os.path.relpath(effect.file, folder.resolve())).as_posix()
+            name = Path(os.path.relpath(effect.file, Path(*parts))).as_posix()
     text = _fields(effect, **{source: name})
     text.yaml_add_eol_comment(effect.family, source, COMMENT_COLUMN)
     return text

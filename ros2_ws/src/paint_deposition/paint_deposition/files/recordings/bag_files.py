@@ -171,6 +171,11 @@ class Bag:
             else:
                 text, _ = definitions.installed(connection.msgtype)
                 types = get_types_from_msg(text, connection.msgtype)
+            # Of the project's own types earlier versions have fewer fields.
+            for name in [n for n in types.keys() & standard.keys() if 'paint_msgs' not in n]:
+                found = {field for field, _ in types[name][1]}
+                if lacking := [field for field, _ in standard[name][1] if field not in found]:
+                    raise RecordingError(f'{topic}: its definition of {name} lacks {lacking[0]}')
             # For each element of these rosbags would write a line of code.
             entries: list[Any] = [*types.values()]
             fields = (kind for _, of in entries for _, kind in of)
