@@ -85,14 +85,6 @@ def test_mistakes_are_counted_per_campaign_and_learned_laws_are_none():
     assert found(rows, 'unknown cause blamed on an effect') == [True]
 
 
-def test_failures_are_strong_causes_not_named_and_effects_wrongly_accepted():
-    weak = result('e', strength=3.0)
-    crash = {'case': 'f', 'kind': 'clean', 'error': 'ValueError: x'}
-    lines = scores.failures([RIGHT, LISTED, WRONG, BLAMED, weak, crash]).splitlines()
-    assert [line[0] for line in lines] == ['f', 'b', 'c', 'd']
-    assert '6 campaigns, 1 errors' in scores.table([RIGHT, LISTED, WRONG, BLAMED, weak, crash])
-
-
 def test_what_is_stated_is_compared_with_what_is_observed():
     every = [RIGHT, LISTED, WRONG, BLAMED]
     (high,) = (line for line in scores.reliability(every) if line.startswith('  0.80 to 0.95'))

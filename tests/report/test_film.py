@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 import paint_deposition as pd
@@ -22,7 +21,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.report.colour_scales import BELOW, HIGH, WITHIN
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.drawing import PartPicture, View, label_points, save_picture
+from paint_deposition.report.drawing import PartPicture, View, save_picture
 from paint_deposition.report.film_pictures import film_picture
 from paint_deposition.report.page import report_html
 from paint_deposition.report.readings_pictures import comparison_figure
@@ -166,14 +165,6 @@ def test_what_is_seen_is_drawn_over_what_it_hides_and_edges_are_outline_and_fold
     vertices, faces = folded(0.01)
     picture = PartPicture.of(pd.Surface.from_triangles(vertices, faces, 0.05))
     assert 0 < len(picture.edges_m) < 400
-
-
-def test_a_point_is_labelled_beside_what_is_written_there():
-    axes = Figure().subplots()
-    axes.text(9.0, 9.0, '20')
-    label_points(axes, np.zeros((1, 2)), ['1'], 1.0)
-    (label,) = axes.texts[1:]
-    assert np.hypot(*(np.subtract(label.get_position(), 9.0))) > 9.0
 
 
 @pytest.mark.slow

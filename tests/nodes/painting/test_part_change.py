@@ -18,6 +18,7 @@ from rclpy.lifecycle import TransitionCallbackReturn
 import paint_deposition as pd
 from brushes import two_brushes
 from nodes.cell import PANEL_M, offline_um, parameters, saved_um, two_passes, write_panel
+from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.model.eq1_pattern import Brush
@@ -59,6 +60,32 @@ def change(onlooker, call):
 def wider(tmp_path):
     """The mesh of another part."""
     return str(write_panel(tmp_path / 'wider.stl', scale=1.3))
+
+
+def test_a_film_goes_on_from_the_recording_of_its_part_after_a_crash(
+    record, simulator, robot, painted, change, wider, executor, wait_until
+):
+    """Poses are sent while there is no simulator, too."""
+    recorder, node = record(), simulator()
+    source = robot(node, recorder)
+    assert change(serial='7').success
+    wait_until(lambda: recorder.run.folder.name == '7', what='the run')
+    source.send(MOTION, slice(0, 100))
+    painted(node, 100)
+    executor.remove_node(node)
+    node.destroy_node()
+    source.send(MOTION, slice(100, 150))
+    sent_s, counts = time.monotonic(), recorder.run.counts
+    wait_until(lambda: counts.get('/atomizer/pose') == 150 and time.monotonic() > sent_s + 1.0)
+    run = str(recorder.run.folder)
+    with pytest.raises(PaintError, match=r'is of .*panel\.stl with the part_pose none: give'):
+        simulator(resume_from=run, mesh_file=wider)
+    again = simulator(resume_from=run)
+    wait_until(lambda: source.is_subscribed_by(again), what='the next simulator')
+    source.send(MOTION, slice(150, None))
+    assert np.array_equal(painted(again, len(MOTION)), offline_um(again, MOTION))
+    assert (again.parts.part.serial, again.film.counts.rejected) == ('7', 0)
+    wait_until(lambda: counts['/atomizer/pose'] == len(MOTION), what='all in the same run')
 
 
 def test_each_part_has_its_film_and_its_run(

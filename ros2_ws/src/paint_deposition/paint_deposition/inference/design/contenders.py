@@ -85,7 +85,8 @@ class Contender:
         """
         fit = study.beside(self.fit.parameters, self.fit.vector)
         if errors is None:
-            errors, _ = ways_off(study, fit, _laws_of(fit), usual.model)[self.off]
+            laws = frozenset(e.id for e in fit.model.effects if e.family != 'learned')
+            errors, _ = ways_off(study, fit, laws, usual.model)[self.off]
         columns = [study.nuisance, errors]
         if self.covariate:
             values = standardised(study, usual.model)[self.covariate]
@@ -101,10 +102,6 @@ class Contender:
             return evidence + LOG_PRIOR[self.name]
         prior = log_odds(PRIOR_EFFECT) + float(np.log(self.share))
         return evidence + gain_of_sizes(self.fit, [self.name], freedom) + prior
-
-
-def _laws_of(fit: Fit) -> frozenset[str]:
-    return frozenset(e.id for e in fit.model.effects if e.family != 'learned')
 
 
 def contenders_of(
@@ -148,7 +145,8 @@ def contenders_of(
         sizes = best_amplitude_sizes(rough, [name], freedom)
         there = fitted(effect, discrepancy=best.null.discrepancy, sizes=sizes)
         weights, ways = [], []
-        for k, (errors, share) in enumerate(ways_off(study, there, _laws_of(there), usual.model)):
+        laws = frozenset(e.id for e in there.model.effects if e.family != 'learned')
+        for k, (errors, share) in enumerate(ways_off(study, there, laws, usual.model)):
             way = Contender(name, there, best.sizes, off=k, share=share)
             weights.append(way.log_weight(way.null(study, usual, errors), freedom))
             ways.append(way)

@@ -51,6 +51,7 @@ class AtomizerInput:
         newest_ns: stamp of the last pose that was painted or dropped, 0 before the first.
         sent_ns, state_sent_ns: when the last pose received and the last state taken were sent, 0
             before the first.
+        recorded_sent_ns: what was sent until then is painted from a recording, and not taken.
         refused_s, pose_s: monotonic times of the last pose refused and of the last one received.
         spraying: whether the gun sprays, by the newest state; False before the first.
         last_poses: those that show the speed of the TCP now; programmed_m_per_s: that of the
@@ -72,6 +73,7 @@ class AtomizerInput:
         self._pose_topic = gun_topic(name, topics.POSE_TOPIC)
         self._state_topic = gun_topic(name, topics.STATE_TOPIC)
         self.poses_received = self.newest_ns = self.sent_ns = self.state_sent_ns = 0
+        self.recorded_sent_ns = -1
         self.refused_s = self.pose_s = self._flushed_s = -math.inf
         self.spraying, self.programmed_m_per_s = False, 0.0
         self.unheard_states = ''
@@ -146,6 +148,8 @@ class AtomizerInput:
         self.flush()
 
     def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
+        if sent_ns <= self.recorded_sent_ns:
+            return
         if self._held is not None and sent_ns > self._hold_after_ns:
             # Hours of poses.
             if len(self._held) < 2_000_000:

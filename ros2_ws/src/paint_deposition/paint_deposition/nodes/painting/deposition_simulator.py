@@ -5,12 +5,21 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+from paint_msgs.msg import Part
 from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 
+from paint_deposition.errors import PaintError
+from paint_deposition.files.motion_files import read_gun_motions
+from paint_deposition.files.recordings.bag_files import open_bag
+from paint_deposition.files.recordings.mcap_recovery import recover
+from paint_deposition.film.live_film import without_refused_states
+from paint_deposition.motion.pose_stream import events_of
 from paint_deposition.nodes.node import Task
 from paint_deposition.nodes.painting.film_display import FilmDisplay, film_figures
 from paint_deposition.nodes.painting.painting_node import PaintingNode
@@ -24,7 +33,12 @@ from paint_deposition.nodes.parameters import (
     require_display,
     require_file_name,
 )
+from paint_deposition.nodes.topics import POSE_TOPIC, STATE_TOPIC, gun_topic
 from paint_deposition.report.write import write_film
+from paint_deposition.request import MotionOptions
+
+# After which what was sent before is in the file of a recorder [s].
+RECORDED_S = 1.2
 
 
 class DepositionSimulator(PaintingNode):
@@ -54,6 +68,12 @@ class DepositionSimulator(PaintingNode):
                 '', 'Zones of the part with targets of their own, YAML; empty: none [path]'
             ),
         ),
+        'resume_from': NodeParameter(
+            '',
+            'Recording of the part in the cell, finished or not, with which its film begins, as '
+            'after a crash; empty: none [path]',
+            fixed_because='it is painted before all that comes; restart the node',
+        ),
         'output_directory': NodeParameter(
             'runs',
             'Where ~/save_film writes [path]',
@@ -69,9 +89,54 @@ class DepositionSimulator(PaintingNode):
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self.display = FilmDisplay(self)
-        self.parts = PartChange(self, version, self._saving, saving)
+        run = self.values['resume_from']
+        told = self._resume(Path(run).expanduser()) if run else None
+        self.parts = PartChange(self, version, self._saving, saving, told)
         self.publish()
         return {**tasks, 'part': self.parts.status}
+
+    def _resume(self, run: Path) -> Part | None:
+        """Paint what a recording has of the part, and nothing of it again.
+
+        Returns:
+            The part, if it was announced.
+
+        Raises:
+            PaintError: nothing can be read, or it is of another part.
+        """
+        time.sleep(RECORDED_S)
+        guns = [gun for gun in self.gun_names if gun]
+        topics = [
+            [self.resolve_topic_name(gun_topic(gun, topic)) for gun in self.gun_names]
+            for topic in (POSE_TOPIC, STATE_TOPIC)
+        ]
+        with TemporaryDirectory() as folder:
+            copy = recover(run, Path(folder) / 'run')[0].folder
+            with open_bag(copy) as bag:
+                named = [topic.name for topic in bag.topics if topic.message_count]
+                sent = [bag.sent_ns([topic]).values() for topic in topics[0]]
+                told = [t.name for t in bag.topics_of('paint_msgs/msg/Part') if t.name in named]
+                parts = [deserialize_message(m.cdr, Part) for m in bag.messages(told)]
+            options = {'frame_id': self.frame.frame_id}
+            if not guns:
+                kinds = zip(('pose_topic', 'state_topic'), topics, strict=True)
+                options |= {name: topic for name, (topic,) in kinds if topic in named}
+            motions = read_gun_motions([copy], MotionOptions(**options), guns)
+        part = parts[-1] if parts else None
+        pose = list(self.values['part_pose'] or [])
+        if part and (part.mesh_id, list(part.part_pose)) != (self.surface.mesh_id, pose):
+            place = ' '.join(f'{value:g}' for value in part.part_pose) or 'none'
+            raise PaintError(
+                f'{run} is of {part.mesh_file} with the part_pose {place}: give these, and '
+                'max_edge_length_m as before'
+            )
+        for source, gun, times, (_, motion) in zip(
+            self.inputs, self.film.guns, sent, motions, strict=True
+        ):
+            gun.replay(events_of(without_refused_states(motion, gun.model)))
+            source.recorded_sent_ns = max(times, default=-1)
+            source.spraying = bool(gun.flow)
+        return part
 
     def _cleanup(self) -> None:
         self.parts.close()

@@ -51,6 +51,7 @@ class PartChange:
         version: of the mesh of the part in the cell.
         saving: the thread that writes films.
         group: callback group of the service.
+        part: that is in the cell already, as it was announced, if it was.
 
     Attributes:
         part: the part in the cell, as published.
@@ -63,12 +64,13 @@ class PartChange:
         version: Version,
         saving: ThreadPoolExecutor,
         group: CallbackGroup,
+        part: Part | None = None,
     ) -> None:
         self._node, self._version, self._saving = node, version, saving
         self._folder = Path(node.values['output_directory'])
-        self.part = Part(mesh_file=node.mesh_file, coat=1)
+        self.part = part or Part(mesh_file=node.mesh_file, coat=1)
         # The run of the part and coat, and how often the film was reset since.
-        self._run, self._resets = '', 0
+        self._run, self._resets = self.part.run, 0
         self._since = datetime.now(timezone.utc)
         present: Future[PreparedPart] = Future()
         present.set_result((node.surface, node.points, node.film, node.zones))
@@ -84,6 +86,8 @@ class PartChange:
         )
         self._publisher = node.create_publisher(Part, topics.PART_TOPIC, topics.LATCHED)
         node.create_service(ChangePart, '~/change_part', self._answer, callback_group=group)
+        if part:
+            self._publisher.publish(part)
 
     def close(self) -> None:
         """Save the film if the part has a serial number, and those that could not be saved.
