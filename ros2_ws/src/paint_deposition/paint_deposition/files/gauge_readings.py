@@ -269,7 +269,9 @@ def table_text(lines: Iterable[Sequence[object]]) -> str:
     """Lines of values as CSV in which no program finds a formula: ' stands before such texts."""
     text = StringIO(newline='')
     writer = csv.writer(text, lineterminator='\n')
-    writer.writerows([FORMULA.sub("'", str(v)) for v in line] for line in lines)
+    writer.writerows(
+        [FORMULA.sub("'", v) if isinstance(v, str) else v for v in line] for line in lines
+    )
     return text.getvalue()
 
 

@@ -244,7 +244,7 @@ def _scene(path: Path, kind: str) -> Scene:
             vars(beside)['absolute'] = lambda name: require_file(place(name), MeshError)
         # A file would be read for as many bytes at once as its head claims.
         source = BytesIO(content)
-    if kind in ('.step', '.stp'):
+    else:
         if importlib.util.find_spec(STEP_READER) is None:
             raise MeshError(
                 f'{path}: STEP files are read by {STEP_READER}, which is not installed; run: pip '

@@ -13,6 +13,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory
 from paint_deposition.request import POSE_FORMAT, is_pose
 
+# A programme that runs longer loops where it should not.
 LONGEST_S = 8 * 3600.0
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
 

@@ -85,8 +85,7 @@ class Contender:
         """
         fit = study.beside(self.fit.parameters, self.fit.vector)
         if errors is None:
-            laws = frozenset(e.id for e in fit.model.effects if e.family != 'learned')
-            errors, _ = ways_off(study, fit, laws, usual.model)[self.off]
+            errors, _ = ways_off(study, fit, None, usual.model)[self.off]
         columns = [study.nuisance, errors]
         if self.covariate:
             values = standardised(study, usual.model)[self.covariate]
@@ -145,8 +144,7 @@ def contenders_of(
         sizes = best_amplitude_sizes(rough, [name], freedom)
         there = fitted(effect, discrepancy=best.null.discrepancy, sizes=sizes)
         weights, ways = [], []
-        laws = frozenset(e.id for e in there.model.effects if e.family != 'learned')
-        for k, (errors, share) in enumerate(ways_off(study, there, laws, usual.model)):
+        for k, (errors, share) in enumerate(ways_off(study, there, None, usual.model)):
             way = Contender(name, there, best.sizes, off=k, share=share)
             weights.append(way.log_weight(way.null(study, usual, errors), freedom))
             ways.append(way)

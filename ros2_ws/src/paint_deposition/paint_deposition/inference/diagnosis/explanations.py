@@ -234,9 +234,11 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str], model: DepositionMo
 
 
 def ways_off(
-    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
+    study: Study, fit: Fit, kept: frozenset[str] | None, model: DepositionModel
 ) -> list[tuple[np.ndarray, float]]:
     """Ways in which the laws of effects in a model may be off, as ``law_errors``.
+
+    Without ids in ``kept``, of all that were not learned.
 
     Returns:
         Of each way the directions (P, n) over the noise, and its prior share.
@@ -288,9 +290,11 @@ def standardised(study: Study, model: DepositionModel) -> dict[str, np.ndarray]:
     }
 
 
-def _changes(study: Study, fit: Fit, kept: frozenset[str]) -> Changes:
+def _changes(study: Study, fit: Fit, kept: frozenset[str] | None) -> Changes:
     """What the effects change whose laws may be off."""
     film, found = study.forward.predict_um(fit.model), []
+    if kept is None:
+        kept = frozenset(e.id for e in fit.model.effects if e.family != 'learned')
     for effect in (e for e in fit.model.effects if e.id in kept and not e.exact):
         others = tuple(e for e in fit.model.effects if e.id != effect.id)
         without = fit.model.model_copy(update={'effects': others})

@@ -33,8 +33,6 @@ MOST_LAWS = 2
 LEAST_GAIN = 0.02
 # A law that was chosen, and the size of its amplitudes.
 Sized = tuple[Explanation, float]
-
-
 # (n, P) films [um] by the covariates without a law, the identity of the set, and what is left out.
 Films = dict[tuple[frozenset[str], int, bytes], np.ndarray]
 # Null hypotheses by what kind of law must say more than them, see ``nulls_around``.
