@@ -10,13 +10,13 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 import scenes
+from paint_deposition.effects import closed_forms
 from paint_deposition.effects.catalogue import LEARNED
+from paint_deposition.effects.closed_forms import forms_of
 from paint_deposition.effects.learned_curves import CURVES
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.effect_file import load_effect_file
 from paint_deposition.film.statistics import film_statistics
-from paint_deposition.inference.diagnosis import closed_forms
-from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.kernel.eq2_flux import Ray

@@ -15,7 +15,7 @@ from paint_deposition.effects.catalogue import EFFECTS, learned_law
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.comparison.profiles import profiles_of
-from paint_deposition.inference.diagnosis.proposals import Place, Spray
+from paint_deposition.inference.design.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import EffectClass
 from paint_deposition.inference.fitting.estimates import Estimate

@@ -12,11 +12,11 @@ from booth import MODEL, panel, path_of, serpentine
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.design import reading_choice
+from paint_deposition.inference.design.proposals import Spray, StationarySpray, spots, suits
 from paint_deposition.inference.design.reading_choice import CandidateDesign, choose, design_at
 from paint_deposition.inference.design.sprays import MENU
 from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.model_space import SIZES
-from paint_deposition.inference.diagnosis.proposals import Spray, StationarySpray, spots, suits
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.readings.places import grid_places
 

@@ -10,7 +10,7 @@ from scipy.stats import binom, kstest, multivariate_t
 from inference.diagnosis import linear
 from inference.diagnosis.linear import law, unknown
 from paint_deposition.effects.learned_laws import LearnedFootprint
-from paint_deposition.inference.diagnosis import model_space, proposals
+from paint_deposition.inference.diagnosis import model_space, testability
 from paint_deposition.inference.diagnosis.discrepancy import PRIOR, Footprints, ModelDiscrepancy
 from paint_deposition.inference.diagnosis.discrepancy import DiscrepancyHyperparameters as Sizes
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
@@ -258,22 +258,22 @@ def test_a_detectable_amplitude_is_detected_nine_times_in_ten(freedom, plain, fo
     """Through the test that the diagnosis makes, on readings that the effect has moved."""
     monkeypatch.setattr(model_space, 'DRAWS', 500)
     space = model_space.EffectEvidence(plain, found, freedom)
-    _, detectable = proposals.testability(space, seed=3)
-    limit = np.quantile(space.evidence(space.null_draws(3)), 1.0 - proposals.LEVEL)
+    _, detectable = testability.testability(space, seed=3)
+    limit = np.quantile(space.evidence(space.null_draws(3)), 1.0 - testability.LEVEL)
     noise = simulated(READINGS, freedom, POWER_RUNS, seed=6)
     for explanation in found[4:6]:
         effect, (name,) = explanation.cause, explanation.law.amplitudes()
         typical = explanation.law.parameters()[name]['typical']
         change = detectable[effect][name] / typical * plain.whiten(explanation.columns)
         seen = np.count_nonzero(space.evidence(noise + change) > limit)
-        low, high = binom.interval(1.0 - CHANCE, POWER_RUNS, proposals.POWER)
+        low, high = binom.interval(1.0 - CHANCE, POWER_RUNS, testability.POWER)
         assert low <= seen <= high, effect
 
 
 def test_what_nature_leaves_over_or_hides_in_the_pattern_is_less_testable(plain, found):
     def detectable_gain(null: NullModel) -> float:
         space = model_space.EffectEvidence(null, found, np.inf)
-        _, detectable = proposals.testability(space, seed=3)
+        _, detectable = testability.testability(space, seed=3)
         return detectable['edge_build']['gain']
 
     along = found[4].columns
@@ -282,4 +282,4 @@ def test_what_nature_leaves_over_or_hides_in_the_pattern_is_less_testable(plain,
     # A direction that the pattern takes up whole shows nothing, however strong.
     hidden = plain.columns[:, 0] / np.linalg.norm(plain.columns[:, 0])
     space = model_space.EffectEvidence(plain, [law('edge_build', hidden)], np.inf)
-    assert proposals.testability(space, seed=0) == (('edge_build',), {})
+    assert testability.testability(space, seed=0) == (('edge_build',), {})

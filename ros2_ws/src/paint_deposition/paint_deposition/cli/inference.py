@@ -226,9 +226,9 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
     on from there, give that model.yaml as --model.
     """
     from paint_deposition.effects.catalogue import effect_class
+    from paint_deposition.effects.closed_forms import forms_of
     from paint_deposition.effects.learned_curves import LearnedCurve
     from paint_deposition.files.effect_file import load_effect_file
-    from paint_deposition.inference.diagnosis.closed_forms import forms_of
     from paint_deposition.report.write_inference import effect_entry, write_effect_file
 
     added = None

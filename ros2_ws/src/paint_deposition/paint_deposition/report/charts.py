@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.effects.closed_forms import forms_of, variable_at
 from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
 from paint_deposition.effects.learned_laws import (
     LEAST_FACTOR,
@@ -12,7 +13,6 @@ from paint_deposition.effects.learned_laws import (
     LearnedMap,
     places_m,
 )
-from paint_deposition.inference.diagnosis.closed_forms import forms_of, variable_at
 from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.report.colour_scales import (
     ACCENT,

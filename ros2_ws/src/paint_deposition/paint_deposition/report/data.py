@@ -15,8 +15,8 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import wanted_at
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.profiles import Profile, profiles_of
+from paint_deposition.inference.design.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.model_space import SURE
-from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.estimates import Estimate, estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES

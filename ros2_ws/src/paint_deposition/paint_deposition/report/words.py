@@ -7,6 +7,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import LEARNED
+from paint_deposition.effects.closed_forms import forms_of
 from paint_deposition.effects.learned_curves import LearnedCurve, counted_from_1
 from paint_deposition.effects.learned_laws import (
     LEAST_FACTOR,
@@ -14,9 +15,8 @@ from paint_deposition.effects.learned_laws import (
     LearnedLaw,
     LearnedMap,
 )
-from paint_deposition.inference.diagnosis.closed_forms import forms_of
+from paint_deposition.inference.design.proposals import Spray
 from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
-from paint_deposition.inference.diagnosis.proposals import Spray
 from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
 from paint_deposition.inference.fitting.study import Study
 

@@ -9,6 +9,12 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.closed_forms import (
+    ClosedForm,
+    Parameter,
+    at_knots,
+    variable,
+)
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned_curves import LearnedCurve
 from paint_deposition.effects.learned_laws import LEAST_FACTOR, LearnedLaw
@@ -17,12 +23,6 @@ from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.model_file import ModelFile, write_model
 from paint_deposition.files.provenance import origin
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
-from paint_deposition.inference.diagnosis.closed_forms import (
-    ClosedForm,
-    Parameter,
-    at_knots,
-    variable,
-)
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.estimates import Estimate, estimates

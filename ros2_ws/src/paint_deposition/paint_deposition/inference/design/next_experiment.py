@@ -19,8 +19,7 @@ from paint_deposition.inference.design.contenders import (
     contenders_of,
     one_by_one,
 )
-from paint_deposition.inference.design.sprays import AS_BEFORE, MENU, Change, pairs
-from paint_deposition.inference.diagnosis.proposals import (
+from paint_deposition.inference.design.proposals import (
     KEY,
     Place,
     Spray,
@@ -28,6 +27,7 @@ from paint_deposition.inference.diagnosis.proposals import (
     spots,
     suits,
 )
+from paint_deposition.inference.design.sprays import AS_BEFORE, MENU, Change, pairs
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import on_one_thread

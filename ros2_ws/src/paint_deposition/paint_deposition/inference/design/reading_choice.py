@@ -21,7 +21,7 @@ from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.explanations import sensitivity
 from paint_deposition.inference.diagnosis.model_space import SIZES
-from paint_deposition.inference.diagnosis.proposals import LEVEL
+from paint_deposition.inference.diagnosis.testability import LEVEL
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.readings.gauge_noise import ASSUMED_FREEDOM, ENOUGH_REPEATS
 from paint_deposition.inference.readings.places import (

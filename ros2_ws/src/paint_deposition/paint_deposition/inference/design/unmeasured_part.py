@@ -17,7 +17,7 @@ from paint_deposition.inference.diagnosis.explanations import (
 )
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import EffectEvidence
-from paint_deposition.inference.diagnosis.proposals import power_along
+from paint_deposition.inference.diagnosis.testability import power_along
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters, Posterior

@@ -30,9 +30,9 @@ from paint_deposition.inference.diagnosis.learning import (
     nulls_around,
 )
 from paint_deposition.inference.diagnosis.model_space import ALPHA
-from paint_deposition.inference.diagnosis.proposals import testability
 from paint_deposition.inference.diagnosis.search import EffectSet, Group, Search, SearchStage
 from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
+from paint_deposition.inference.diagnosis.testability import testability
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread

@@ -20,7 +20,7 @@ from paint_deposition.inference.diagnosis.explanations import (
     nonparametric_laws_of,
     of_places,
 )
-from paint_deposition.inference.diagnosis.proposals import Testability
+from paint_deposition.inference.diagnosis.testability import Testability
 from paint_deposition.inference.diagnosis.verdict import (
     Diagnosis,
     EffectClass,

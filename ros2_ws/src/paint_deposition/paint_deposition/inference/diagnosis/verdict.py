@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.closed_forms import forms_of
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned_laws import LearnedLaw
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
-from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.model_space import ALPHA
-from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, Estimate
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.panel import Panel
@@ -23,6 +22,9 @@ from paint_deposition.inference.fitting.posterior import PatternShift, posterior
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
+
+if TYPE_CHECKING:  # what comes after a diagnosis and is kept with it
+    from paint_deposition.inference.design.proposals import Place, Spray
 
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
 
