@@ -37,8 +37,10 @@ def named(diagnosis: pd.Diagnosis) -> list[set[str]]:
     ('nozzle', 'as_repeats'), [(ONE, True), (OTHER, False)], ids=['repeats', 'parts']
 )
 def test_of_three_heights_the_spread_is_named_and_nothing_else(diagnosed, nozzle, as_repeats):
+    """At the most with a standoff that was told wrongly, which can look the same."""
     found = diagnosed(nozzle, as_repeats=as_repeats)
-    assert named(found) == [{'pattern_spread'}]
+    (group,) = named(found)
+    assert {found.classes[0].best} == {'pattern_spread'} <= group <= ALIKE
     assert -0.4 < found.model.effect('pattern_spread').exponent < -0.1
     assert found.history[-1].rmse_um < found.history[0].rmse_um
     # No part is worse by more than the noise.

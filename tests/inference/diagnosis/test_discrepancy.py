@@ -9,7 +9,6 @@ from booth import MODEL
 from inference.diagnosis import readings_on_door
 from inference.diagnosis.readings_on_door import at_model, on_door, on_panel, study_of
 from paint_deposition.effects.learned_laws import WAVES
-from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.design.sprays import MENU
 from paint_deposition.inference.diagnosis import discrepancy as of_nature
 from paint_deposition.inference.diagnosis.discrepancy import FINE_RADII, PRIOR, ModelDiscrepancy
@@ -71,7 +70,6 @@ def test_choices_are_as_probable_as_one_also_with_what_an_earlier_job_says(discr
 
 def test_parts_painted_alike_share_the_setting_and_others_the_footprint(study, discrepancy):
     """Those painted alike differ by the part. They were measured at the same places."""
-    shapes = discrepancy.shapes
     for settings, parts in zip(discrepancy.settings, discrepancy.parts, strict=True):
         own = between(study, settings, FIRST, FIRST)
         assert own.any()
@@ -79,8 +77,6 @@ def test_parts_painted_alike_share_the_setting_and_others_the_footprint(study, d
         assert between(study, parts, FIRST, FIRST) == pytest.approx(own)
         assert not between(study, parts, FIRST, SECOND).any()
         assert not between(study, parts, DOOR, DOOR).any()
-    own = between(study, shapes, FIRST, FIRST)
-    assert between(study, shapes, FIRST, SECOND) == pytest.approx(own)
     for sizes in discrepancy.choices():
         assert not between(study, discrepancy.of_parts(sizes), DOOR, FIRST).any()
         assert between(study, discrepancy.of_footprint(sizes), DOOR, FIRST).any()
@@ -141,51 +137,6 @@ def test_the_footprint_changes_the_readings_by_what_no_pattern_does(alone):
     fit = at_model(study)
     pattern = fit.jacobian[:, : len(fit.parameters.pattern)]
     assert np.abs(pattern.T @ columns[:, 2:]).max() < 1e-6 * np.linalg.norm(pattern)
-
-
-def test_the_spray_wanders_sideways_by_a_share_of_its_width(alone):
-    """Along the tool's x and y alike; one setting alone has no pattern but the model's."""
-    study, discrepancy = alone
-    radius = np.linspace(0.0, 0.5, 2001)
-    flux = mean_flux(radius)
-    width_m = np.sqrt(np.trapezoid(radius**3 * flux) / np.trapezoid(radius * flux))
-    values, vectors = np.linalg.eigh(discrepancy.shapes)
-    seen = values > 1e-6 * values[-1]
-    assert seen.sum() == 2
-    for name in ('offset_x_m', 'offset_y_m'):
-        offset = TcpOffset(**{name: PRIOR.sideways * width_m})
-        change = study.forward.predict_um(MODEL.with_effect(offset))
-        change = (change - study.forward.predict_um(MODEL)) / study.sigma_um
-        along = vectors[:, seen].T @ change
-        assert np.linalg.norm(along) == pytest.approx(np.linalg.norm(change), rel=0.01)
-        assert np.sum(along**2 / values[seen]) == pytest.approx(1.0, rel=0.1)
-
-
-def test_the_pattern_differs_between_settings_but_not_in_its_level(study, discrepancy):
-    fit = at_model(study)
-    door = study.campaign.experiment_of == DOOR
-    shapes = between(study, discrepancy.shapes, DOOR, DOOR)
-    values, vectors = np.linalg.eigh(shapes)
-    seen = vectors[:, values > 1e-9 * values[-1]]
-    assert seen.shape[1] > 2
-    names = fit.parameters.coordinates
-
-    def left(name: str) -> float:
-        change = fit.jacobian[door, names.index(name)]
-        return np.linalg.norm(change - seen @ (seen.T @ change)) / np.linalg.norm(change)
-
-    assert left('log_K1') > 0.01
-    assert max(left(name) for name in ('K2', 'r_m')) < 1e-6
-
-
-def test_beside_another_fit_only_pattern_and_place_vary_otherwise(study, discrepancy):
-    moved = MODEL.with_effect(TcpOffset(offset_x_m=0.03))
-    around = discrepancy.around(study, at_model(study, moved))
-    assert around.settings is discrepancy.settings
-    assert around.footprint is discrepancy.footprint
-    assert not np.allclose(around.shapes, discrepancy.shapes)
-    same = discrepancy.around(study, at_model(study))
-    np.testing.assert_allclose(same.shapes, discrepancy.shapes)
 
 
 def test_where_no_paint_lands_nothing_is_left_over():

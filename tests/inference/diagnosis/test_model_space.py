@@ -41,13 +41,13 @@ def discrepancy() -> ModelDiscrepancy:
     away = np.abs(np.subtract.outer(PLACE, PLACE))
     fields = tuple(FILM**2 * smooth(away / length) for length in (0.1, 0.5, 1.0))
     footprint = np.random.default_rng(6).normal(size=(READINGS, 1))
-    none, unseen = np.zeros_like(away), np.empty((0, 1))
+    unseen = np.empty((0, 1))
     basis = Basis(LearnedFootprint, {}, unseen, unseen.T, 1.0)
     columns = tuple(size * footprint for size in SHARES)
     laws = tuple(RandomLaw(basis, 0.1 * size * np.eye(1)) for size in SHARES)
     footprints = Footprints(columns, laws, radius_m=np.zeros(1), flux=np.ones(1))
-    rest = 3 * (none,), False, (0.02, 0.05, 0.1), np.zeros(READINGS, dtype=int)
-    return ModelDiscrepancy(linear.MODEL, footprints, none, fields, *rest)
+    rest = 3 * (np.zeros_like(away),), False, (0.02, 0.05, 0.1), np.zeros(READINGS, dtype=int)
+    return ModelDiscrepancy(linear.MODEL, footprints, fields, *rest)
 
 
 @pytest.fixture

@@ -75,24 +75,23 @@ class Contender:
         return self.name not in LOG_PRIOR
 
     def null(
-        self, study: Study, usual: ModelDiscrepancy, errors: np.ndarray | None = None
+        self, study: Study, discrepancy: ModelDiscrepancy, errors: np.ndarray | None = None
     ) -> NullModel:
         """What it gives the readings of a study, among them those that it was fitted to.
 
         Args:
-            usual: their discrepancy around one model of all contenders.
+            discrepancy: theirs, around one model of all contenders.
             errors: (P, n) by which its laws are off, if they are known, see ``ways_off``.
         """
         fit = study.beside(self.fit.parameters, self.fit.vector)
         if errors is None:
-            errors, _ = ways_off(study, fit, None, usual.model)[self.off]
+            errors, _ = ways_off(study, fit, None, discrepancy.model)[self.off]
         columns = [study.nuisance, errors]
         if self.covariate:
-            values = standardised(study, usual.model)[self.covariate]
+            values = standardised(study, discrepancy.model)[self.covariate]
             law = SIZES[-1] * FACTOR * root_of_field(values, LAW_LENGTH, NEGLIGIBLE)
             columns.append((fit.predicted_um / study.sigma_um)[:, np.newaxis] * law)
-        discrepancy = usual.around(study, fit).covariance(self.sizes)
-        return NullModel.around(fit, np.hstack(columns), discrepancy=discrepancy)
+        return NullModel.around(fit, np.hstack(columns), discrepancy.covariance(self.sizes))
 
     def log_weight(self, null: NullModel, freedom: float) -> float:
         """Logarithm of its posterior weight, for what it gives readings."""
@@ -136,7 +135,7 @@ def contenders_of(
     base = fitted()
     shapes = {name: neutral_shapes(library[name]) for name in names}
     space = space_around(study, base, [*of_effects(study, base, shapes)])
-    best, usual, freedom = space.best, space.discrepancy, space.freedom
+    best, discrepancy, freedom = space.best, space.discrepancy, space.freedom
     base, found = fitted(discrepancy=best.null.discrepancy), []
     for name in names:
         effect = fit.model.effect(name) or space.central.by_law(name)[1]
@@ -144,9 +143,9 @@ def contenders_of(
         sizes = best_amplitude_sizes(rough, [name], freedom)
         there = fitted(effect, discrepancy=best.null.discrepancy, sizes=sizes)
         weights, ways = [], []
-        for k, (errors, share) in enumerate(ways_off(study, there, None, usual.model)):
+        for k, (errors, share) in enumerate(ways_off(study, there, None, discrepancy.model)):
             way = Contender(name, there, best.sizes, off=k, share=share)
-            weights.append(way.log_weight(way.null(study, usual, errors), freedom))
+            weights.append(way.log_weight(way.null(study, discrepancy, errors), freedom))
             ways.append(way)
         found.append(ways[int(np.argmax(weights))])
     if diagnosis.unknown is not None:
@@ -190,10 +189,10 @@ class Forecast:
             known: how many are.
         """
         base = contenders[-1].fit
-        usual = ModelDiscrepancy.of(study, study.beside(base.parameters, base.vector))
+        discrepancy = ModelDiscrepancy.of(study, study.beside(base.parameters, base.vector))
         weights, means, factors = [], [], []
         for contender in contenders:
-            null = contender.null(study, usual).select(order)
+            null = contender.null(study, discrepancy).select(order)
             mean, factor = null.predicted(known)
             expected = (study.measured_um / study.sigma_um)[order] - null.scaled_deviation
             freedom = study.noise.degrees_of_freedom

@@ -18,7 +18,6 @@ from scipy.spatial.distance import cdist
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned_laws import HARMONICS, WAVES
-from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.smooth_laws import (
     RandomLaw,
     beside_pattern,
@@ -61,10 +60,6 @@ PRIOR = SimpleNamespace(
     footprint_lengths=(0.1, 0.3),
     # Factor by which the size of a bell's footprint's deviations differs between jobs.
     footprint_between_jobs=1.5,
-    # The pattern differs between settings by this share of what it differs between jobs, and moves
-    # sideways by this share of its root mean square radius: 0.01 to 0.03 were measured.
-    of_jobs=1.0 / 3.0,
-    sideways=0.02,
 )
 # Knots along the radius of a footprint.
 FINE_RADII = 20
@@ -148,8 +143,6 @@ class ModelDiscrepancy:
 
     model: DepositionModel  # around which it is taken
     footprint: Footprints  # deviations that all parts share
-    # (P, P) covariance of the pattern's parameters and its place in each setting.
-    shapes: np.ndarray
     # For each length (P, P), covariances of fields of size one over parts painted alike together,
     # and over each by itself; of the latter only where parts were painted alike.
     settings: tuple[np.ndarray, ...]
@@ -180,7 +173,6 @@ class ModelDiscrepancy:
         return ModelDiscrepancy(
             model,
             Footprints.of(study, fit),
-            _shapes(study, fit, setting_of),
             tuple(field(setting_of, scale, length_m) for length_m in lengths_m),
             tuple(field(owner, scale * repeated, length_m) for length_m in lengths_m),
             bool(repeated.any()),
@@ -189,17 +181,12 @@ class ModelDiscrepancy:
             known.footprint if known else None,
         )
 
-    def around(self, study: Study, fit: Fit) -> 'ModelDiscrepancy':
-        """The discrepancy where pattern and place of a spray vary as around another fit."""
-        return replace(self, shapes=_shapes(study, fit, self.setting_of))
-
     def select(self, rows: np.ndarray) -> 'ModelDiscrepancy':
         """The discrepancy at some of the points."""
         both, columns = np.ix_(rows, rows), (each[rows] for each in self.footprint.columns)
         return replace(
             self,
             footprint=replace(self.footprint, columns=tuple(columns)),
-            shapes=self.shapes[both],
             settings=tuple(field[both] for field in self.settings),
             parts=tuple(field[both] for field in self.parts),
             setting_of=self.setting_of[rows],
@@ -251,7 +238,7 @@ class ModelDiscrepancy:
     def of_parts(self, sizes: DiscrepancyHyperparameters) -> np.ndarray:
         """(P, P) that of settings and of parts."""
         k = sizes.length
-        of_settings = self.shapes + sizes.setting**2 * self.settings[k]
+        of_settings = sizes.setting**2 * self.settings[k]
         return of_settings + sizes.part**2 * self.parts[k] if sizes.part else of_settings
 
 
@@ -282,32 +269,6 @@ def _flux_and_tails(
         ).T / len(patterns)
     mean_over_angle = np.eye(WAVES)[:, :1]
     return flux, np.kron(tails, mean_over_angle)
-
-
-def _shapes(study: Study, fit: Fit, group: np.ndarray) -> np.ndarray:
-    """(P, P) covariance of pattern and place of the spray between groups (P,) of parts."""
-    own = (group[:, np.newaxis] == np.arange(group.max() + 1)).astype(float)
-    sideways_m = PRIOR.sideways * _width_m(fit.model)
-    changes = sideways_m * _sideways(study, fit.model) / study.sigma_um[:, np.newaxis]
-    if own.shape[1] > 1:  # with one setting, its pattern is the model's own
-        pattern = fit.parameters.pattern
-        between = PRIOR.of_jobs * np.array([c.between_jobs for c in pattern.coordinates])
-        between[[pattern.entries(row)[0] for row in range(pattern.count)]] = 0.0
-        changes = np.hstack([changes, fit.jacobian[:, : len(pattern)] * between])
-    return (own @ own.T) * (changes @ changes.T)
-
-
-def _sideways(study: Study, model: DepositionModel) -> np.ndarray:
-    """(P, 2) change of the readings as the pattern moves along the tool's x and y [um/m]."""
-    step_m = 1e-3
-    here = study.forward.predict_um(model)
-    offset = model.effect('tcp_offset') or TcpOffset()
-    moved = []
-    for name in ('offset_x_m', 'offset_y_m'):
-        step = -step_m if getattr(offset, name) > 0.0 else step_m
-        shifted = offset.model_copy(update={name: getattr(offset, name) + step})
-        moved.append((study.forward.predict_um(model.with_effect(shifted)) - here) / step)
-    return np.stack(moved, axis=1)
 
 
 def _width_m(model: DepositionModel) -> float:

@@ -44,7 +44,7 @@ def nulls_around(best: EffectSet, fit: Fit) -> Nulls:
     """What a law of each kind must say more than, beside a set of effects and a fit with it."""
     study, sizes, discrepancy = best.state.study, best.best.sizes, best.discrepancy
     plain = NullModel.around(fit, study.nuisance)
-    off = law_errors(study, fit, best.names, best.usual.model)
+    off = law_errors(study, fit, best.names, best.discrepancy.model)
     correction = plain.with_discrepancy(discrepancy.covariance(sizes))
     usual = plain.with_discrepancy(discrepancy.covariance(discrepancy.usual(sizes)))
     return {

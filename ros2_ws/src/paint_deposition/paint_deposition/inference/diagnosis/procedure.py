@@ -74,9 +74,9 @@ def diagnose(
     progress('computing the evidence of what may be missing')
     search = Search(state)
     nothing = search.nothing
-    testable = testability(nothing.space.central, seed)
-    usual = nothing.best.null.discrepancy
-    state = replace(state, testable=testable, figures=nothing.space.figures, discrepancy=usual)
+    testable, figures = testability(nothing.space.central, seed), nothing.space.figures
+    discrepancy = nothing.best.null.discrepancy
+    state = replace(state, testable=testable, figures=figures, discrepancy=discrepancy)
     p_value = min(nothing.p_values)
     if p_value >= ALPHA:
         return _nothing_missing(state, nothing, p_value)
@@ -239,7 +239,7 @@ def _conclude(
         alike = [n for n, shapes in state.candidates.items() if over in shapes[0].covariates]
         if alike:
             reason += f' Effects that depend on {over} by another law: {", ".join(alike)}.'
-    if len(set(best.usual.setting_of)) == 1:
+    if len(set(best.discrepancy.setting_of)) == 1:
         reason += (
             ' All parts were painted alike: it may belong to the part or to the spray. Spray '
             'the same part another way.'

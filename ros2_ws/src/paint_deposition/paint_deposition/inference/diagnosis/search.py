@@ -67,17 +67,17 @@ class EffectSet:
     state: DiagnosisState
     names: frozenset[str]  # of the effects
     fit: Fit  # of the model with them, the discrepancy being allowed for
-    usual: ModelDiscrepancy  # around the one fit that all compared sets share
+    discrepancy: ModelDiscrepancy  # around the one fit that all compared sets share
     sizes: Sequence[DiscrepancyHyperparameters]  # of the discrepancy that matter
 
     @staticmethod
     def around(state: DiagnosisState, names: frozenset[str], fit: Fit) -> 'EffectSet':
         """A set, and the discrepancy around its own fit, at the sizes that matter."""
-        usual = ModelDiscrepancy.of(state.study, fit)
+        discrepancy = ModelDiscrepancy.of(state.study, fit)
         laws = [*of_effects(state.study, fit, state.candidates)]
         plain = NullModel.around(fit, state.study.nuisance)
-        sizes = probable_hyperparameters(plain, usual, laws, state.freedom)
-        return EffectSet(state, names, fit, usual, sizes)
+        sizes = probable_hyperparameters(plain, discrepancy, laws, state.freedom)
+        return EffectSet(state, names, fit, discrepancy, sizes)
 
     @property
     def effects(self) -> dict[str, Effect]:
@@ -100,16 +100,11 @@ class EffectSet:
         return Step.of(self.state.study, '', self.result).holdout_rmse_um
 
     @cached_property
-    def discrepancy(self) -> ModelDiscrepancy:
-        """The discrepancy beside the model."""
-        return self.usual.around(self.state.study, self.fit)
-
-    @cached_property
     def weighed(self) -> list[WeightedNull]:
         """The model as the null hypothesis, its laws being off, with each size of discrepancy."""
         study, freedom = self.state.study, self.state.freedom
         found = []
-        for columns, share in ways_off(study, self.fit, self.names, self.usual.model):
+        for columns, share in ways_off(study, self.fit, self.names, self.discrepancy.model):
             null = NullModel.around(self.fit, np.hstack([study.nuisance, columns]))
             found += [
                 WeightedNull.of(null, self.discrepancy, sizes, freedom, share)
@@ -306,7 +301,7 @@ class Search:
         best = max(near, key=lambda one: one.log_evidence)
         self._trials, self._tried = {best.names: best}, set()
         self._patterns = (nothing.fit.model, *(one.fit.model for one in near))
-        for start in (replace(nothing, usual=best.usual, sizes=best.sizes), best):
+        for start in (replace(nothing, discrepancy=best.discrepancy, sizes=best.sizes), best):
             self.nothing = self._refitted({}, start)
         return self.nothing
 
