@@ -46,7 +46,7 @@ def discrepancy() -> ModelDiscrepancy:
     columns = tuple(size * footprint for size in SHARES)
     laws = tuple(RandomLaw(basis, 0.1 * size * np.eye(1)) for size in SHARES)
     footprints = Footprints(columns, laws, radius_m=np.zeros(1), flux=np.ones(1))
-    rest = 3 * (np.zeros_like(away),), False, (0.02, 0.05, 0.1), np.zeros(READINGS, dtype=int)
+    rest = 3 * (np.zeros_like(away),), False, (0.02, 0.05, 0.1)
     return ModelDiscrepancy(linear.MODEL, footprints, fields, *rest)
 
 

@@ -149,7 +149,6 @@ class ModelDiscrepancy:
     parts: tuple[np.ndarray, ...]
     is_repeated: bool  # whether any were
     lengths_m: tuple[float, ...]  # of these fields [m]
-    setting_of: np.ndarray  # (P,) number of the setting of each point, see ``painted_alike``
     # What an earlier job says of the size of the footprint's deviations, see ``Posterior``.
     known_footprint: tuple[float, float] | None = None
 
@@ -162,7 +161,7 @@ class ModelDiscrepancy:
         thickest = np.array([film[owner == k].max() for k in range(len(campaign.experiments))])
         scale = np.sqrt(film * thickest[owner]) / study.sigma_um
         group = painted_alike(campaign.experiments)
-        repeated, setting_of = (np.bincount(group)[group] > 1)[owner], group[owner]
+        repeated = (np.bincount(group)[group] > 1)[owner]
         lengths_m = tuple(length * _width_m(model) for length in PRIOR.lengths)
 
         def field(of: np.ndarray, size: np.ndarray, length_m: float) -> np.ndarray:
@@ -173,11 +172,10 @@ class ModelDiscrepancy:
         return ModelDiscrepancy(
             model,
             Footprints.of(study, fit),
-            tuple(field(setting_of, scale, length_m) for length_m in lengths_m),
+            tuple(field(group[owner], scale, length_m) for length_m in lengths_m),
             tuple(field(owner, scale * repeated, length_m) for length_m in lengths_m),
             bool(repeated.any()),
             lengths_m,
-            setting_of,
             known.footprint if known else None,
         )
 
@@ -189,7 +187,6 @@ class ModelDiscrepancy:
             footprint=replace(self.footprint, columns=tuple(columns)),
             settings=tuple(field[both] for field in self.settings),
             parts=tuple(field[both] for field in self.parts),
-            setting_of=self.setting_of[rows],
         )
 
     def choices(self) -> list[DiscrepancyHyperparameters]:

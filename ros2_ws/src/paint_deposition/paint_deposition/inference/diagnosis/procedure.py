@@ -17,6 +17,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.diagnosis.discrepancy import painted_alike
 from paint_deposition.inference.diagnosis.explanations import (
     nonparametric_laws_of,
     of_corrections,
@@ -239,7 +240,7 @@ def _conclude(
         alike = [n for n, shapes in state.candidates.items() if over in shapes[0].covariates]
         if alike:
             reason += f' Effects that depend on {over} by another law: {", ".join(alike)}.'
-    if len(set(best.discrepancy.setting_of)) == 1:
+    if not painted_alike(state.study.campaign.experiments).any():
         reason += (
             ' All parts were painted alike: it may belong to the part or to the spray. Spray '
             'the same part another way.'
