@@ -11,13 +11,12 @@ from paint_deposition.inference.diagnosis.model_space import EffectEvidence
 LEVEL, POWER = 0.05, 0.9
 # Signal-to-noise ratios at which the power is simulated, and with how many draws.
 RATIOS, DRAWS = np.geomspace(2.5, 10.0, 10), 200
-
-
+# Ids of effects that do not show, and detectable amplitudes of the others by id and parameter.
 Testability = tuple[tuple[str, ...], dict[str, dict[str, float]]]
 
 
 def testability(space: EffectEvidence, seed: int) -> Testability:
-    """Ids of effects that do not show, and detectable amplitudes of the others by parameter."""
+    """What these readings can show of each effect beside the model of an evidence."""
     shapes: dict[type[Effect], list[Explanation]] = {}
     for explanation in space.explanations:
         if explanation.law is not None:
