@@ -126,7 +126,7 @@ def test_the_guide_comes_to_a_painted_door(repository, tmp_path, demo, undrawn):
         '8.0 to 23.4 µm': '8.0 to 23.4 µm',
         'The readings show incidence_attraction': 'the readings show incidence_attraction',
         '7 horizontal passes at 188 mm, 0.638 m/s': 'seven passes, 188 mm apart at 0.638 m/s',
-        'sigma_n 4.2 → 2.9 %': 'by 4.2 % (σ_N)',
+        'sigma_n 4.2 → 2.8 %': 'by 4.2 % (σ_N)',
         '99.9 % of it within 20 ± 2 µm': '99.9 % of the door is within 2 µm of its 20 µm',
     }.items():
         assert printed in everything
