@@ -162,7 +162,8 @@ class ModelDiscrepancy:
         scale = np.sqrt(film * thickest[owner]) / study.sigma_um
         group = painted_alike(campaign.experiments)
         repeated = (np.bincount(group)[group] > 1)[owner]
-        lengths_m = tuple(length * _width_m(model) for length in PRIOR.lengths)
+        width_m = _width_m(model)
+        lengths_m = tuple(length * width_m for length in PRIOR.lengths)
 
         def field(of: np.ndarray, size: np.ndarray, length_m: float) -> np.ndarray:
             # Parts that are this far from each other share no field [m].

@@ -75,9 +75,8 @@ def diagnose(
     progress('computing the evidence of what may be missing')
     search = Search(state)
     nothing = search.nothing
-    testable, figures = testability(nothing.space.central, seed), nothing.space.figures
-    discrepancy = nothing.best.null.discrepancy
-    state = replace(state, testable=testable, figures=figures, discrepancy=discrepancy)
+    testable = testability(nothing.space.central, seed)
+    state = replace(nothing.told_in(state), testable=testable)
     p_value = min(nothing.p_values)
     if p_value >= ALPHA:
         return _nothing_missing(state, nothing, p_value)
@@ -94,8 +93,7 @@ def diagnose(
         *of_footprint(state.study, fit, worth=-np.inf),
     ]
     left_out = LeftOut(nothing, stages, best, options)
-    state = replace(state, figures=best.space.figures, discrepancy=best.best.null.discrepancy)
-    state = _accept(state, fit, groups, left_out.errors_um())
+    state = _accept(best.told_in(state), fit, groups, left_out.errors_um())
     progress('learning what the laws leave unexplained')
     state = _learn(state, best, left_out)
     outliers = () if sound else state.study.outliers  # it is done anew once

@@ -69,7 +69,7 @@ def refit(
         return state.diagnosis(np.nan, 'fit_broken', trouble)
     search = Search(state)
     nothing = search.nothing
-    state = _beside(state, nothing)
+    state = nothing.told_in(state)
     p_value = min(nothing.p_values)
     missing = p_value < ALPHA
     if added is None:
@@ -85,9 +85,7 @@ def refit(
     progress(f'fitting with {added.id}')
     before, with_it = state.history[-1], search.with_effect(nothing, added.id)
     probability = inclusion_of([with_it.log_evidence], [nothing.log_evidence])
-    state = replace(
-        _beside(state, with_it), amplitude_sizes=with_it.fit.parameters.amplitude_sizes
-    )
+    state = replace(with_it.told_in(state), amplitude_sizes=with_it.fit.parameters.amplitude_sizes)
     state = state.with_step(added.id, with_it.result)
     state = state.accepting((added.id,), probability, before)
     reason = (
@@ -97,11 +95,6 @@ def refit(
     if missing and probability > SURE:
         return state.diagnosis(p_value, 'effect_missing', reason)
     return state.diagnosis(p_value, 'undecided' if missing else 'none_missing', reason)
-
-
-def _beside(state: DiagnosisState, best: EffectSet) -> DiagnosisState:
-    """The state with the discrepancy beside a set of effects."""
-    return replace(state, figures=best.space.figures, discrepancy=best.best.null.discrepancy)
 
 
 def _with_learned(

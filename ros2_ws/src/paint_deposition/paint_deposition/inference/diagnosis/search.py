@@ -118,6 +118,10 @@ class EffectSet:
         nature = (one for one in self.weighed if not one.sizes.is_beyond_nature)
         return max(nature, key=lambda one: one.log_weight)
 
+    def told_in(self, state: DiagnosisState) -> DiagnosisState:
+        """A state with the discrepancy beside this set, and its figures."""
+        return replace(state, figures=self.space.figures, discrepancy=self.best.null.discrepancy)
+
     @cached_property
     def p_values(self) -> tuple[float, float]:
         """Of causes, and of fields on the parts, if nothing acted; see ``ModelSpace``."""
